@@ -1,0 +1,1 @@
+"""The papers' experiments: constants with units and equation numbers, truth, measurements."""

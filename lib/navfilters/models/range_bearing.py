@@ -1,0 +1,96 @@
+"""z = (range, bearing) of a point in the plane, seen from the origin."""
+
+from dataclasses import dataclass
+
+from navfilters import validation
+from navfilters.types import Array
+
+
+@dataclass(frozen=True, eq=False)
+class RangeBearing:
+    """Distance and angle of a point x = (x1, x2), z = (|x|, atan2(x2, x1)) + v with v ~ N(0, R).
+
+    Parameters
+    ----------
+    R : array (..., 2, 2)
+        Noise covariance, symmetric positive definite: units squared, radians squared.
+
+    Raises
+    ------
+    ValueError
+        Naming the argument, the value found and what is needed.
+
+    Notes
+    -----
+    Bearings are in (-pi, pi] and residuals are *not* wrapped, as in the paper: a filter that looks
+    across the negative x1 axis sees a jump of 2 pi. At the origin the derivatives do not exist;
+    they are not finite there. The paper writes a plain arctangent; with it the UKF's divergence
+    would not look as the paper shows it.
+
+    References
+    ----------
+    perea2007, section III.
+    """
+
+    R: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "R", validation.covariance("R", self.R, 2, definite=True))
+
+    def h(self, x: Array) -> Array:
+        """Range and bearing, (..., 2).
+
+        Parameters
+        ----------
+        x : array (..., 2)
+            Position, in units.
+
+        Returns
+        -------
+        array (..., 2)
+            Range in units, bearing in radians.
+        """
+        xp = x.__array_namespace__()
+        x1, x2 = x[..., 0], x[..., 1]
+        return xp.stack([xp.hypot(x1, x2), xp.atan2(x2, x1)], axis=-1)
+
+    def jacobian(self, x: Array) -> Array:
+        """First derivatives, (..., 2, 2): rows range and bearing, columns x1 and x2.
+
+        Parameters
+        ----------
+        x : array (..., 2)
+
+        Returns
+        -------
+        array (..., 2, 2)
+        """
+        xp = x.__array_namespace__()
+        x1, x2 = x[..., 0], x[..., 1]
+        r = xp.hypot(x1, x2)
+        c, s = x1 / r, x2 / r
+        return _matrix(xp, c, s, -s / r, c / r)
+
+    def hessian(self, x: Array) -> Array:
+        """Second derivatives of range and of bearing, (..., 2, 2, 2).
+
+        Parameters
+        ----------
+        x : array (..., 2)
+
+        Returns
+        -------
+        array (..., 2, 2, 2)
+        """
+        xp = x.__array_namespace__()
+        x1, x2 = x[..., 0], x[..., 1]
+        r = xp.hypot(x1, x2)
+        c, s = x1 / r, x2 / r
+        of_range = _matrix(xp, s * s, -s * c, -s * c, c * c) / r[..., None, None]
+        sin_2, cos_2 = 2 * s * c, c * c - s * s
+        of_bearing = _matrix(xp, sin_2, -cos_2, -cos_2, -sin_2) / (r * r)[..., None, None]
+        return xp.stack([of_range, of_bearing], axis=-3)
+
+
+def _matrix(xp, a: Array, b: Array, c: Array, d: Array) -> Array:
+    return xp.stack([xp.stack([a, b], axis=-1), xp.stack([c, d], axis=-1)], axis=-2)

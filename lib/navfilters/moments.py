@@ -1,0 +1,230 @@
+"""How a filter predicts its measurement: three approximations of the same three moments.
+
+Each function takes (prior, model) and returns :class:`~navfilters.types.Moments`; a filter is
+one of them, perhaps a variant of it, and the common update of :mod:`navfilters.filters`.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from navfilters import linalg
+from navfilters.types import Array, Gaussian, MeasurementModel, Moments
+
+
+def linearized(prior: Gaussian, model: MeasurementModel) -> Moments:
+    """Moments of the measurement under a first-order expansion about the prior mean.
+
+    z_hat = h(x),   P_zz = R + H P H^T,   P_xz = P H^T
+
+    Parameters
+    ----------
+    prior : Gaussian
+        mean (..., n), cov (..., n, n), in the state's units.
+    model : MeasurementModel
+        Gives h (..., m), jacobian (..., m, n) and R (..., m, m).
+
+    Returns
+    -------
+    Moments
+        z_hat (..., m), P_zz (..., m, m), P_xz (..., n, m).
+
+    References
+    ----------
+    perea2007, Eqs. (10)-(12).
+    """
+    H = model.jacobian(prior.mean)
+    P_xz = prior.cov @ H.mT
+    return Moments(model.h(prior.mean), model.R + H @ P_xz, P_xz)
+
+
+def second_order(prior: Gaussian, model: MeasurementModel) -> Moments:
+    """Moments of the modified truncated second-order filter.
+
+    z_hat = h(x) + b,   P_zz = R + H P H^T - b b^T,   P_xz = P H^T,   b_i = tr(h_i'' P) / 2
+
+    Parameters
+    ----------
+    prior : Gaussian
+        mean (..., n), cov (..., n, n).
+    model : MeasurementModel
+        Gives h, jacobian, hessian (..., m, n, n) and R.
+
+    Returns
+    -------
+    Moments
+        z_hat (..., m), P_zz (..., m, m), which may be indefinite, and P_xz (..., n, m).
+
+    Notes
+    -----
+    The paper prints the bias with the *updated* covariance, which does not exist yet; the prior's
+    is meant. For a Gaussian, second-order terms would *add* to P_zz; truncating the fourth moments
+    leaves the subtraction that costs this filter its definiteness.
+
+    References
+    ----------
+    perea2007, Eqs. (18)-(20).
+    """
+    first = linearized(prior, model)
+    b = second_order_bias(prior, model)
+    return Moments(first.z_hat + b, first.P_zz - b[..., :, None] * b[..., None, :], first.P_xz)
+
+
+def second_order_bias(prior: Gaussian, model: MeasurementModel) -> Array:
+    """The bias b_i = tr(h_i'' P) / 2 that curvature adds to the expected measurement.
+
+    Parameters
+    ----------
+    prior : Gaussian
+        mean (..., n), cov (..., n, n).
+    model : MeasurementModel
+        Gives hessian (..., m, n, n).
+
+    Returns
+    -------
+    array (..., m)
+        In the measurement's units.
+
+    References
+    ----------
+    perea2007, the definition below Eq. (20).
+    """
+    products = model.hessian(prior.mean) * prior.cov[..., None, :, :]
+    xp = products.__array_namespace__()
+    return xp.sum(products, axis=(-2, -1)) / 2
+
+
+@dataclass(frozen=True)
+class SigmaPoints:
+    """Where an unscented filter samples its prior, and how it weighs the samples.
+
+    Parameters
+    ----------
+    alpha : float or array (...)
+        Spread, larger than 0. An array is one setting per member of the batch.
+    beta : float or array (...)
+        Added to the central covariance weight; 2 is right for a Gaussian.
+    kappa : float or array (...), optional
+        Second spread parameter, larger than -n. By default 3 - n, n being the state's size.
+    root : {"cholesky", "symmetric"}
+        The matrix square root whose columns become the sigma points.
+
+    Raises
+    ------
+    ValueError
+        An unknown root; alpha, beta or kappa not finite; alpha, or n + kappa, not positive.
+
+    References
+    ----------
+    perea2007, Eq. (21), which leaves all four open; the names are those of its reference 12.
+    """
+
+    alpha: Array = 1.0
+    beta: Array = 2.0
+    kappa: Array | None = None
+    root: Literal["cholesky", "symmetric"] = "cholesky"
+
+    def __post_init__(self) -> None:
+        if self.root not in ROOTS:
+            raise ValueError(f"root must be one of {sorted(ROOTS)}; found {self.root!r}")
+        for name in ("alpha", "beta") if self.kappa is None else ("alpha", "beta", "kappa"):
+            value = np.asarray(getattr(self, name), float)
+            if not np.isfinite(value).all() or (name == "alpha" and (value <= 0).any()):
+                needed = "positive" if name == "alpha" else "finite"
+                raise ValueError(f"{name} must be {needed}; found {value}")
+
+    def weights(self, n: int) -> tuple[Array, Array, Array, Array]:
+        """Scaling and weights for a state of size n.
+
+        Parameters
+        ----------
+        n : int
+            Size of the state.
+
+        Returns
+        -------
+        tuple of array (...)
+            (gamma, W0_m, W0_c, W_i): the scale of the offsets, the central point's weight in means
+            and in covariances, and the weight of each of the 2 n other points.
+        """
+        kappa = 3.0 - n if self.kappa is None else np.asarray(self.kappa, float)
+        if np.any(n + kappa <= 0):
+            raise ValueError(
+                f"kappa must be larger than {-n} for a state of size {n}; found {kappa}"
+            )
+        alpha, beta = np.asarray(self.alpha, float), np.asarray(self.beta, float)
+        scale = alpha**2 * (n + kappa)  # n + lambda
+        W0_m = 1 - n / scale
+        return np.sqrt(scale), W0_m, W0_m + 1 - alpha**2 + beta, 0.5 / scale
+
+
+ROOTS = {"cholesky": linalg.cholesky, "symmetric": linalg.symmetric_root}
+
+
+def sigma_points(prior: Gaussian, points: SigmaPoints) -> Array:
+    """The 2 n + 1 sigma points of a prior: its mean, then mean + and mean - each scaled column.
+
+    Parameters
+    ----------
+    prior : Gaussian
+        mean (..., n), cov (..., n, n).
+    points : SigmaPoints
+        Scaling and square root.
+
+    Returns
+    -------
+    array (2 n + 1, ..., n)
+        The points in *front* of the batch axes, so that a model's own batch axes still line up.
+        NaN, except the mean, where cov has no square root.
+
+    References
+    ----------
+    perea2007, Eq. (21).
+    """
+    xp = prior.cov.__array_namespace__()
+    gamma, *_ = points.weights(prior.mean.shape[-1])
+    S = xp.asarray(gamma)[..., None, None] * ROOTS[points.root](prior.cov)
+    columns = xp.moveaxis(S, -1, 0)
+    return prior.mean + xp.concat([xp.zeros_like(columns[:1]), columns, -columns], axis=0)
+
+
+def unscented(
+    prior: Gaussian, model: MeasurementModel, *, points: SigmaPoints = SigmaPoints()
+) -> Moments:
+    """Moments of the measurement by weighted sigma points, redrawn from the prior.
+
+    z_hat = sum W_m Z,   P_zz = R + sum W_c (Z - z_hat)(Z - z_hat)^T,
+    P_xz = sum W_c (X - x)(Z - z_hat)^T,   Z = h(X)
+
+    Parameters
+    ----------
+    prior : Gaussian
+        mean (..., n), cov (..., n, n).
+    model : MeasurementModel
+        Gives h (..., m) and R (..., m, m).
+    points : SigmaPoints
+        Scaling, weights and square root.
+
+    Returns
+    -------
+    Moments
+        z_hat (..., m), P_zz (..., m, m), P_xz (..., n, m); NaN where cov has no square root.
+
+    References
+    ----------
+    perea2007, Eqs. (21)-(25); its Eq. (26) is empty.
+    """
+    X = sigma_points(prior, points)
+    Z = model.h(X)
+    xp = Z.__array_namespace__()
+    _, _, W0_c, W_i = (xp.asarray(w) for w in points.weights(prior.mean.shape[-1]))
+    # The weights sum to one. Summing differences keeps the digits that a large negative W0 would
+    # cancel.
+    z_hat = Z[0] + W_i[..., None] * xp.sum(Z[1:] - Z[0], axis=0)
+    dZ = xp.moveaxis(Z - z_hat, 0, -1)
+    dX = xp.moveaxis(X[1:] - prior.mean, 0, -1)
+    centre, others = dZ[..., :1], dZ[..., 1:]
+    W0_c, W_i = W0_c[..., None, None], W_i[..., None, None]
+    P_zz = model.R + W0_c * (centre @ centre.mT) + W_i * (others @ others.mT)
+    return Moments(z_hat, P_zz, W_i * (dX @ others.mT))

@@ -1,0 +1,1 @@
+"""The independent second computations; they import nothing from the rest of the package."""

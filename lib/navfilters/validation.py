@@ -1,0 +1,149 @@
+"""Checks at the door: what found, what needed, and in which argument."""
+
+from typing import Any
+
+import numpy as np
+
+from navfilters.types import Gaussian
+
+SYMMETRY = 1e-9
+"""Largest relative difference between a covariance and its transpose that is taken for rounding."""
+
+
+def real_array(name: str, value: Any, core: str) -> np.ndarray:
+    """A finite float64 copy-free view of value with at least the named trailing axes.
+
+    Parameters
+    ----------
+    name : str
+        The argument, as the caller knows it.
+    value : array-like
+        What was given.
+    core : str
+        The trailing axes, such as "n, n".
+
+    Returns
+    -------
+    ndarray (..., core)
+
+    Raises
+    ------
+    ValueError
+        Not real numbers, too few axes, a core of size zero, or values that are not finite.
+    """
+    needed = f"{name} must be an array (..., {core}) of finite real numbers"
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{needed}; found {type(value).__name__} ({error})") from None
+    if array.dtype.kind not in "iuf":
+        raise ValueError(f"{needed}; found dtype {array.dtype}")
+    array = array.astype(np.float64, copy=False)
+    axes = core.count(",") + 1
+    if array.ndim < axes or 0 in array.shape[array.ndim - axes :]:
+        raise ValueError(f"{needed}; found shape {array.shape}")
+    bad = ~np.isfinite(array)
+    if bad.any():
+        where = tuple(int(i) for i in np.argwhere(bad)[0])
+        raise ValueError(f"{needed}; found {array[where]} at index {where}")
+    return array
+
+
+def covariance(name: str, value: Any, size: int | None = None, *, definite: bool) -> np.ndarray:
+    """A symmetric covariance (..., n, n), positive definite or semidefinite.
+
+    Parameters
+    ----------
+    name : str
+        The argument, as the caller knows it.
+    value : array-like
+        What was given.
+    size : int, optional
+        The n that is needed.
+    definite : bool
+        Whether zero eigenvalues are refused too.
+
+    Returns
+    -------
+    ndarray (..., n, n)
+        The symmetric part.
+
+    Raises
+    ------
+    ValueError
+        Wrong shape, not finite, not symmetric, or not (semi)definite; with the value found.
+    """
+    array = real_array(name, value, "n, n")
+    rows, columns = array.shape[-2:]
+    if rows != columns or (size is not None and rows != size):
+        wanted = "(..., n, n)" if size is None else f"(..., {size}, {size})"
+        raise ValueError(f"{name} must have shape {wanted}; found {array.shape}")
+    scale = np.abs(array).max(axis=(-2, -1))
+    skew = np.abs(array - array.mT).max(axis=(-2, -1))
+    if (skew > SYMMETRY * scale).any():
+        raise ValueError(
+            f"{name} must be symmetric; found a difference of {skew.max():.3g} from its transpose"
+        )
+    array = (array + array.mT) / 2
+    deviation = np.sqrt(np.abs(np.diagonal(array, axis1=-2, axis2=-1)))
+    deviation = np.where(deviation > 0, deviation, 1.0)
+    correlation = array / (deviation[..., :, None] * deviation[..., None, :])
+    smallest = np.linalg.eigvalsh(correlation).min()  # scaled: units must not decide
+    rounding = 8 * rows * np.finfo(float).eps
+    if smallest < (rounding if definite else -rounding):
+        needed = "definite" if definite else "semidefinite"
+        found = np.linalg.eigvalsh(array).min()
+        raise ValueError(
+            f"{name} must be symmetric positive {needed}; found a smallest eigenvalue of {found:.3g}"
+        )
+    return array
+
+
+def gaussian(name: str, value: Any) -> Gaussian:
+    """A Gaussian whose mean and covariance fit together.
+
+    Parameters
+    ----------
+    name : str
+        The argument, as the caller knows it.
+    value : Gaussian
+        mean (..., n), cov (..., n, n).
+
+    Returns
+    -------
+    Gaussian of ndarray
+
+    Raises
+    ------
+    ValueError
+        Naming ``name``, what is wrong with it, and what is needed.
+    """
+    if not isinstance(value, Gaussian):
+        raise ValueError(f"{name} must be a Gaussian(mean, cov); found {type(value).__name__}")
+    mean = real_array(f"{name}.mean", value.mean, "n")
+    cov = covariance(f"{name}.cov", value.cov, mean.shape[-1], definite=False)
+    return Gaussian(mean, cov)
+
+
+def batch(**shapes: tuple[int, ...]) -> tuple[int, ...]:
+    """The common batch shape of several arguments.
+
+    Parameters
+    ----------
+    **shapes : tuple of int
+        The leading axes of each argument, by its name.
+
+    Returns
+    -------
+    tuple of int
+
+    Raises
+    ------
+    ValueError
+        When they do not broadcast, naming each.
+    """
+    try:
+        return np.broadcast_shapes(*shapes.values())
+    except ValueError:
+        found = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+        raise ValueError(f"leading (batch) axes must broadcast; found {found}") from None
