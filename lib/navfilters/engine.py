@@ -23,8 +23,8 @@ def run(
     Parameters
     ----------
     estimator : callable
-        (prior, z, model) -> Gaussian: a member of :data:`navfilters.FILTERS`, or a
-        :func:`functools.partial` of one with its options.
+        (prior, z, model) -> Gaussian: a member of ``FILTERS``, or a
+        ``functools.partial`` of one with its options.
     prior : Gaussian
         mean (..., n), cov (..., n, n). Leading axes are batch axes and broadcast with those of z,
         of the model and of the options.

@@ -289,12 +289,12 @@ class Filter:
         model : MeasurementModel
             Where it comes from.
         **options
-            Those of the moments function and of the variant; see :attr:`options`.
+            Those of the moments function and of the variant; see ``options``.
 
         Returns
         -------
         Gaussian
-            The updated state. Shapes and values are not checked here; :func:`navfilters.run` does.
+            The updated state. Shapes and values are not checked here; ``run`` does.
 
         Raises
         ------

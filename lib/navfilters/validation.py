@@ -94,7 +94,7 @@ def covariance(name: str, value: Any, size: int | None = None, *, definite: bool
         needed = "definite" if definite else "semidefinite"
         found = np.linalg.eigvalsh(array).min()
         raise ValueError(
-            f"{name} must be symmetric positive {needed}; found a smallest eigenvalue of {found:.3g}"
+            f"{name} must be symmetric positive {needed}; found smallest eigenvalue {found:.3g}"
         )
     return array
 

@@ -11,7 +11,7 @@ from navfilters.types import Array, Gaussian
 
 @dataclass(frozen=True)
 class Setup:
-    """The static experiment; change a field with :func:`dataclasses.replace` and run again.
+    """The static experiment; change a field with ``dataclasses.replace`` and run again.
 
     Parameters
     ----------

@@ -1,0 +1,66 @@
+# Two commands matter: `make book` and `make test`. `make help` lists the rest.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+BUILT := _build/.complete
+SOURCES := $(shell find book lib -type f -not -path '*/__pycache__/*' -not -name '.*' 2>/dev/null) \
+	_config.yml _toc.yml requirements.txt
+
+.DEFAULT_GOAL := help
+.PHONY: help book test unit lint notebooks nbval pages screens lock clean
+
+help:  ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## /\1  /p' $(MAKEFILE_LIST) | awk '{printf "  make %-10s", $$1; $$1 = ""; print}'
+
+book: $(BUILT)  ## execute every notebook and build the HTML; warnings are errors
+	@echo "The book is built. Open _build/html/index.html in a browser."
+
+$(BUILT): $(SOURCES) $(VENV)/.book
+	rm -rf _build
+	$(BIN)/jupyter-book build . --warningiserror --nitpick --keep-going
+	@touch $@
+
+test: lint unit nbval pages  ## everything: lint, types, unit tests, notebooks, rendered pages
+
+unit: $(VENV)/.test  ## unit and property tests with branch coverage
+	$(BIN)/pytest tests --ignore tests/book -n 2 --cov --cov-report=term
+
+lint: $(VENV)/.test  ## ruff over code and notebooks, mypy over the library
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+nbval: $(VENV)/.test  ## run every notebook and compare with its stored outputs
+	$(BIN)/pytest book --nbval --nbval-current-env -n 2 --dist loadscope -p no:cacheprovider
+
+pages: $(VENV)/.test $(BUILT)  ## the ledger, the stored notebooks, and the built pages in a browser
+	$(BIN)/pytest tests/book
+
+notebooks: $(VENV)/.test  ## execute every notebook in place and refresh its stored outputs
+	$(BIN)/python tools/refresh_notebooks.py
+	$(BIN)/ruff format --quiet book
+
+screens: $(VENV)/.test $(BUILT)  ## every page as a picture: wide and 390 px, light and dark
+	$(BIN)/python tools/screens.py _build/html _build/screens
+
+lock:  ## refresh requirements.txt and requirements-test.txt from their .in lists
+	$(PYTHON) -m venv _build/lock
+	_build/lock/bin/pip install --quiet uv
+	_build/lock/bin/uv pip compile --quiet --upgrade --universal --generate-hashes \
+		--python-version 3.11 requirements.in -o requirements.txt
+	_build/lock/bin/uv pip compile --quiet --upgrade --universal --generate-hashes \
+		--python-version 3.11 requirements-test.in -o requirements-test.txt
+
+$(VENV)/.book: requirements.txt pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.txt
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+$(VENV)/.test: requirements-test.txt $(VENV)/.book
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-test.txt
+	@touch $@
+
+clean:  ## remove what was built and the virtual environment
+	rm -rf _build $(VENV)

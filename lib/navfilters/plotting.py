@@ -1,0 +1,254 @@
+"""One hand for every figure: a filter looks the same wherever it appears.
+
+Colour is the family, line style and marker the variant. Curves carry their names where they end, so
+that a figure can be read in grey.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+
+EKF, SECOND_ORDER, UKF, MEASUREMENT = "#D55E00", "#009E73", "#0072B2", "#E69F00"
+TRUTH, BOUND = "black", "0.55"
+
+_DASHES: dict[str, Any] = {
+    "plain": "-",
+    "dashed": (0, (5, 2)),
+    "dotted": (0, (1, 1.4)),
+    "dash-dot": (0, (6, 2, 1, 2)),
+    "long dash": (0, (11, 3)),
+    "dash-dot-dot": (0, (6, 2, 1, 2, 1, 2)),
+}
+_VARIANTS = {
+    "EKF": (EKF, "plain", "o"),
+    "B-EKF 1": (EKF, "dashed", "s"),
+    "B-EKF 2": (EKF, "dotted", "^"),
+    "B-EKF 3": (EKF, "dash-dot", "D"),
+    "B-EKF 4": (EKF, "long dash", "v"),
+    "mtSOF": (SECOND_ORDER, "plain", "o"),
+    "B-mtSOF": (SECOND_ORDER, "dashed", "s"),
+    "UKF": (UKF, "plain", "o"),
+    "B-UKF": (UKF, "dashed", "s"),
+    "UKFz": (UKF, "dash-dot-dot", "P"),
+}
+STYLES: dict[str, dict[str, Any]] = {
+    name: {"color": color, "linestyle": _DASHES[dash], "marker": marker}
+    for name, (color, dash, marker) in _VARIANTS.items()
+}
+"""Matplotlib keywords of each filter."""
+
+
+def use_style() -> None:
+    """Set Matplotlib's defaults for this book; called once, at the top of a chapter."""
+    plt.rcParams.update(
+        {
+            "figure.figsize": (7.0, 4.2),
+            "figure.dpi": 130,
+            "figure.constrained_layout.use": True,
+            "figure.facecolor": "white",
+            "savefig.facecolor": "white",
+            "font.size": 10,
+            "axes.spines.top": False,
+            "axes.spines.right": False,
+            "axes.grid": True,
+            "grid.color": "0.9",
+            "grid.linewidth": 0.6,
+            "lines.linewidth": 1.6,
+            "lines.markersize": 4.5,
+            "legend.frameon": False,
+        }
+    )
+
+
+def error_axes(ax: Axes, *, log_k: bool = True) -> None:
+    """Axes of position error against update number, logarithmic as in the paper.
+
+    Parameters
+    ----------
+    ax : Axes
+    log_k : bool
+        Whether the update number is logarithmic too.
+    """
+    ax.set(xlabel="update k", ylabel="position error (units)", yscale="log")
+    if log_k:
+        ax.set_xscale("log")
+
+
+def curve(ax: Axes, name: str, x: Any, y: Any, **changes: Any) -> None:
+    """One filter's curve in its own style, with some twelve markers spread evenly over the axis.
+
+    Parameters
+    ----------
+    ax : Axes
+        Its x scale must be set already.
+    name : str
+        A key of ``STYLES``; also the curve's label.
+    x, y : array-like (k,)
+    **changes
+        Matplotlib keywords that replace those of the style.
+    """
+    x, y = np.asarray(x, float), np.asarray(y, float)
+    place = np.log(np.maximum(x, 1e-300)) if ax.get_xscale() == "log" else x
+    wanted = np.linspace(place[0], place[-1], 12)
+    marks = sorted({int(np.abs(place - w).argmin()) for w in wanted})
+    style = {"label": name, "markevery": marks, "markerfacecolor": "white", **STYLES[name]}
+    ax.plot(x, y, **{**style, **changes})
+
+
+def label_ends(ax: Axes, *, gap: float = 11.0, names: Mapping[str, str] | None = None) -> None:
+    """Write each curve's name to the right of where it ends, moved apart where they would touch.
+
+    Parameters
+    ----------
+    ax : Axes
+        With final limits and scales.
+    gap : float
+        Least distance between two names, points.
+    names : mapping, optional
+        Other text for some of the labels.
+    """
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    figure.draw_without_rendering()
+    lines = [
+        line
+        for line in ax.get_lines()
+        if not str(line.get_label()).startswith("_")
+        and np.isfinite(np.asarray(line.get_ydata(), float)).any()
+    ]
+    scale = figure.dpi / 72
+    low, high = ax.bbox.y0 / scale, ax.bbox.y1 / scale
+    ends = []
+    for line in lines:
+        x, y = (np.asarray(v, float) for v in (line.get_xdata(), line.get_ydata()))
+        last = np.flatnonzero(np.isfinite(y))[-1]
+        height = ax.transData.transform((x[last], y[last]))[1] / scale
+        ends.append((min(max(height, low), high), line))
+    ends.sort(key=lambda end: end[0])
+    heights = [end[0] for end in ends]
+    for _ in range(100):  # push neighbours apart until none touch
+        for i in range(len(heights) - 1):
+            lack = gap - (heights[i + 1] - heights[i])
+            if lack > 0:
+                heights[i] -= lack / 2
+                heights[i + 1] += lack / 2
+    for height, (_, line) in zip(heights, ends, strict=True):
+        label = str(line.get_label())
+        ax.annotate(
+            (names or {}).get(label, label),
+            (1.0, (height - low) / (high - low)),
+            xycoords="axes fraction",
+            xytext=(6, 0),
+            textcoords="offset points",
+            color=line.get_color(),
+            fontsize=9,
+            va="center",
+            annotation_clip=False,
+        )
+
+
+def ellipse_points(mean: Any, cov: Any, size: float = 1.0, points: int = 400) -> np.ndarray:
+    """Points on the ellipse (x - mean)^T cov^-1 (x - mean) = size^2.
+
+    Parameters
+    ----------
+    mean : array-like (2,)
+    cov : array-like (2, 2)
+        Symmetric positive definite.
+    size : float
+        Its half axes, in deviations.
+    points : int
+
+    Returns
+    -------
+    array (points, 2)
+    """
+    w, V = np.linalg.eigh(np.asarray(cov, float))
+    t = np.linspace(0, 2 * np.pi, points)
+    circle = np.stack([np.cos(t), np.sin(t)])
+    return np.asarray(mean) + size * ((V * np.sqrt(w)) @ circle).T
+
+
+def ellipse(ax: Axes, mean: Any, cov: Any, size: float = 1.0, **style: Any) -> None:
+    """Draw a covariance as its ellipse.
+
+    Parameters
+    ----------
+    ax : Axes
+    mean : array-like (2,)
+    cov : array-like (2, 2)
+    size : float
+        Its half axes, in deviations.
+    **style
+        Matplotlib keywords of the line.
+    """
+    line = {"color": TRUTH, "linewidth": 1.2, **style}
+    ax.plot(*ellipse_points(mean, cov, size).T, **line)
+
+
+def mark_failures(ax: Axes, x: Any, failed: Any, name: str, row: int = 0) -> int:
+    """Mark the members of a sweep that failed on the upper edge of the axes.
+
+    Parameters
+    ----------
+    ax : Axes
+    x : array-like (k,)
+    failed : bool array-like (k,)
+    name : str
+        The filter, for its colour and marker.
+    row : int
+        How many rows of marks lie above.
+
+    Returns
+    -------
+    int
+        How many failed.
+    """
+    x, failed = np.asarray(x), np.asarray(failed, bool)
+    ax.plot(
+        x[failed],
+        np.full(failed.sum(), 0.985 - 0.03 * row),
+        transform=ax.get_xaxis_transform(),
+        linestyle="none",
+        marker="x",
+        color=STYLES[name]["color"],
+        clip_on=False,
+        label=f"_{name} failed",
+    )
+    return int(failed.sum())
+
+
+def at_floor(y: Any, floor: float) -> np.ndarray:
+    """Exact zeros moved to a floor, so that a logarithmic axis has a place for them.
+
+    Parameters
+    ----------
+    y : array-like
+    floor : float
+
+    Returns
+    -------
+    array
+    """
+    y = np.asarray(y, float)
+    return np.where(y == 0, floor, y)
+
+
+def panels(rows: int, columns: int, **keywords: Any) -> tuple[Any, Sequence[Axes]]:
+    """A figure of several axes, as a flat list.
+
+    Parameters
+    ----------
+    rows, columns : int
+    **keywords
+        Those of ``matplotlib.pyplot.subplots``.
+
+    Returns
+    -------
+    tuple of Figure, list of Axes
+    """
+    figure, axes = plt.subplots(rows, columns, squeeze=False, **keywords)
+    return figure, list(axes.flat)

@@ -1,0 +1,247 @@
+"""Stacks of small matrices: right against LAPACK, and a failing member stays alone."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from naive import covariances
+from numpy.testing import assert_allclose, assert_array_equal
+
+from navfilters.linalg import (
+    cholesky,
+    is_positive_definite,
+    right_divide,
+    spectral_norm,
+    symmetric_root,
+)
+
+entries = st.floats(-10, 10)
+sizes = pytest.mark.parametrize("n", [1, 2, 3, 4])
+
+
+def square(n):
+    return arrays(np.float64, (n, n), elements=entries)
+
+
+def symmetric(rng, shape, n):
+    """Random symmetric matrices with eigenvalues of both signs, none near zero."""
+    V, _ = np.linalg.qr(rng.normal(size=(*shape, n, n)))
+    w = rng.uniform(0.5, 2.0, (*shape, 1, n)) * np.where(np.arange(n) % 2, 1, -1)
+    A = (V * w) @ V.mT
+    return (A + A.mT) / 2
+
+
+BROKEN = {
+    "NaN": lambda n: np.full((n, n), np.nan),
+    "one NaN": lambda n: np.where(np.arange(n * n).reshape(n, n) == n * n - 1, np.nan, np.eye(n)),
+    "infinite": lambda n: np.diag(np.full(n, np.inf)),
+    "zero": lambda n: np.zeros((n, n)),
+    "negative": lambda n: -np.eye(n),
+    "indefinite": lambda n: np.diag([1.0] * (n - 1) + [-1.0]),
+    "semidefinite": lambda n: np.ones((n, n)) - (n == 1),
+}
+broken = pytest.mark.parametrize("kind", BROKEN)
+
+
+def stacks(n, kind):
+    """Five healthy members, and the same stack with the third one broken."""
+    healthy = covariances(np.random.default_rng(n), (5,), n)
+    bad = healthy.copy()
+    bad[2] = BROKEN[kind](n)
+    return healthy, bad
+
+
+def assert_alone(function, healthy, bad, member=2):
+    """The broken member is NaN, the others are what they are without it, to the last bit."""
+    with np.errstate(all="ignore"):
+        got, wanted = function(bad), function(healthy)
+    others = np.arange(len(healthy)) != member
+    assert_array_equal(got[others], wanted[others])
+    assert np.isfinite(wanted).all()
+    return got[member]
+
+
+# --- square roots -------------------------------------------------------------------------------
+
+
+@sizes
+@pytest.mark.parametrize("shape", [(), (7,), (2, 3)])
+def test_cholesky_is_lapacks(n, shape):
+    A = covariances(np.random.default_rng(n), shape, n)
+    assert_allclose(cholesky(A), np.linalg.cholesky(A), rtol=1e-12, atol=1e-14)
+
+
+@sizes
+def test_cholesky_reads_the_lower_triangle_only(n):
+    A = covariances(np.random.default_rng(n), (3,), n)
+    assert_array_equal(cholesky(np.tril(A)), cholesky(A))
+
+
+@sizes
+@pytest.mark.parametrize("shape", [(), (7,), (2, 3)])
+def test_symmetric_root_is_the_principal_root(n, shape):
+    A = covariances(np.random.default_rng(n), shape, n)
+    S = symmetric_root(A)
+    wanted = np.stack([scipy.linalg.sqrtm(a).real for a in A.reshape(-1, n, n)]).reshape(A.shape)
+    assert_allclose(S, wanted, rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("root", [cholesky, symmetric_root])
+@pytest.mark.parametrize("n", [2, 3])
+@given(data=st.data())
+def test_roots_give_the_matrix_back(root, n, data):
+    """S S^T = A to rounding, for any scale."""
+    B = data.draw(square(n))
+    A = (B @ B.T + 0.1 * np.eye(n)) * 10.0 ** data.draw(st.integers(-12, 12))
+    S = root(A)
+    assert_allclose(S @ S.T, A, rtol=0, atol=1e-14 * n * np.trace(A))
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+@given(data=st.data())
+def test_symmetric_root_is_symmetric_and_positive(n, data):
+    B = data.draw(square(n))
+    S = symmetric_root(B @ B.T + 0.1 * np.eye(n))
+    assert_allclose(S, S.T, rtol=0, atol=1e-14 * np.trace(S))
+    assert np.linalg.eigvalsh(S).min() > 0
+
+
+@pytest.mark.parametrize("root", [cholesky, symmetric_root])
+@sizes
+@broken
+def test_a_matrix_without_root_is_nan_alone(root, n, kind):
+    healthy, bad = stacks(n, kind)
+    alone = assert_alone(root, healthy, bad)
+    assert not np.isfinite(alone[-1]).all()
+    if root is symmetric_root:
+        assert not np.isfinite(np.diagonal(alone)).any()
+
+
+# --- definiteness and norm ----------------------------------------------------------------------
+
+
+@sizes
+@broken
+def test_broken_matrices_are_not_positive_definite(n, kind):
+    _, bad = stacks(n, kind)
+    with np.errstate(all="ignore"):
+        assert is_positive_definite(bad).tolist() == [True, True, False, True, True]
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+@given(data=st.data())
+def test_definiteness_is_the_sign_of_the_smallest_eigenvalue(n, data):
+    B = data.draw(square(n))
+    A = (B + B.T) / 2
+    w = np.linalg.eigvalsh(A).min()
+    assume(abs(w) > 1e-10)
+    with np.errstate(over="ignore"):  # a subnormal pivot
+        assert is_positive_definite(A) == (w > 0)
+
+
+@sizes
+@pytest.mark.parametrize("shape", [(), (7,), (2, 3)])
+def test_spectral_norm_is_lapacks(n, shape):
+    A = symmetric(np.random.default_rng(n), shape, n)
+    assert_allclose(spectral_norm(A), np.linalg.norm(A, 2, axis=(-2, -1)), rtol=1e-13)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+@given(data=st.data())
+def test_spectral_norm_of_any_symmetric_matrix(n, data):
+    """Any signs and repeated eigenvalues; |c A| = |c| |A|."""
+    B = data.draw(square(n))
+    A = (B + B.T) / 2
+    c = data.draw(st.sampled_from([-1.0, -1e-8, 1e8]))
+    norm = np.linalg.norm(A, 2)
+    assert_allclose(spectral_norm(A), norm, rtol=1e-13, atol=1e-300)
+    assert_allclose(spectral_norm(c * A), abs(c) * norm, rtol=1e-13, atol=1e-300)
+
+
+@sizes
+@pytest.mark.parametrize("kind", ["NaN", "one NaN"])
+def test_the_norm_of_a_nan_matrix_is_nan_alone(n, kind):
+    assert np.isnan(assert_alone(spectral_norm, *stacks(n, kind)))
+
+
+# --- division -----------------------------------------------------------------------------------
+
+
+def matrices(kind, m):
+    rng = np.random.default_rng(m)
+    if kind == "definite":
+        return covariances(rng, (6,), m)
+    if kind == "indefinite":
+        return symmetric(rng, (6,), m)
+    general = rng.normal(size=(6, m, m)) + 2 * np.linalg.qr(rng.normal(size=(6, m, m)))[0]
+    if kind == "zero leading pivot":
+        # A unit antidiagonal dominates, the upper left corner is zero: no elimination starts here.
+        general = 0.2 * general + np.eye(m)[::-1]
+        general[:, 0, 0] = 0.0
+    return general
+
+
+KINDS = ["definite", "indefinite", "general", "zero leading pivot"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "m"),
+    [(k, m) for k in KINDS for m in range(1, 6) if (k, m) != ("zero leading pivot", 1)],
+)
+@pytest.mark.parametrize("n", [1, 3])
+def test_right_divide_is_lapacks(kind, m, n):
+    A = matrices(kind, m)
+    B = np.random.default_rng(10 + n).normal(size=(6, n, m))
+    wanted = np.linalg.solve(A.mT, B.mT).mT
+    got = right_divide(B, A)
+    assert_allclose(got, wanted, rtol=0, atol=1e-11 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("m", [2, 3, 4])
+def test_right_divide_by_a_permutation_is_exact(m):
+    """Every order of pivots, zeros included, for each member on its own."""
+    rng = np.random.default_rng(m)
+    A = np.stack([np.eye(m)[rng.permutation(m)] for _ in range(20)])
+    B = rng.normal(size=(20, 2, m))
+    assert_array_equal(right_divide(B, A), B @ A.mT)
+
+
+@pytest.mark.parametrize("m", [3, 4])
+def test_right_divide_takes_the_largest_pivot(m):
+    """A tiny pivot that is not exchanged would leave no digits."""
+    A = np.eye(m)
+    A[:2, :2] = [[1e-20, 1.0], [1.0, 1.0]]
+    B = np.arange(1.0, 2 * m + 1).reshape(2, m)
+    assert_allclose(right_divide(B, A), np.linalg.solve(A.T, B.T).T, rtol=1e-14)
+
+
+@pytest.mark.parametrize("m", [1, 2, 3, 4])
+@given(data=st.data())
+def test_right_divide_undoes_the_product(m, data):
+    """(X A) A^-1 = X within the condition number's rounding."""
+    A = data.draw(square(m))
+    X = data.draw(arrays(np.float64, (2, m), elements=entries))
+    assume(np.linalg.det(A) != 0)
+    condition = np.linalg.cond(A)
+    assume(condition < 1e6)
+    assert_allclose(right_divide(X @ A, A), X, rtol=0, atol=1e-13 * condition)
+
+
+@pytest.mark.parametrize("m", [1, 2, 3])
+def test_right_divide_broadcasts_batch_axes(m):
+    rng = np.random.default_rng(m)
+    A, B = covariances(rng, (4,), m), rng.normal(size=(3, 1, 2, m))
+    got = right_divide(B, A)
+    assert got.shape == (3, 4, 2, m)
+    for i, j in np.ndindex(3, 4):
+        assert_allclose(got[i, j], right_divide(B[i, 0], A[j]), rtol=1e-13)
+
+
+@pytest.mark.parametrize("m", [1, 2, 3, 4])
+@pytest.mark.parametrize("kind", ["NaN", "zero"])
+def test_a_singular_matrix_is_not_finite_alone(m, kind):
+    healthy, bad = stacks(m, kind)
+    B = np.ones((5, 2, m))
+    assert not np.isfinite(assert_alone(lambda A: right_divide(B, A), healthy, bad)).any()
