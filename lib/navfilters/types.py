@@ -51,7 +51,7 @@ class Moments(NamedTuple):
 
 
 class MeasurementModel(Protocol):
-    """z = h(x) + v with v ~ N(0, R); see :mod:`navfilters.models` for the members."""
+    """z = h(x) + v with v ~ N(0, R); see ``navfilters.models`` for the members."""
 
     @property
     def R(self) -> Array:

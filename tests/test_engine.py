@@ -1,0 +1,487 @@
+"""Histories: shapes, broadcasting, the paper's printed states, and every input that is refused."""
+
+from functools import partial
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from naive import covariances
+from numpy.testing import assert_allclose, assert_array_equal
+
+from navfilters import FILTERS, Gaussian, SigmaPoints, first_indefinite, run
+from navfilters.experiments.perea2007 import Setup, isotropic
+from navfilters.models import Linear, RangeBearing
+
+BASE = Setup()
+MODEL = BASE.model
+EKF = FILTERS["EKF"]
+
+
+def history(name="EKF", **changes):
+    """The baseline of the paper with some arguments of run replaced."""
+    arguments = {"prior": BASE.prior, "z": BASE.z, "model": MODEL, "steps": 5} | changes
+    return run(FILTERS[name], **arguments)
+
+
+# --- histories ----------------------------------------------------------------------------------
+
+
+def test_the_papers_first_two_states():
+    """Section IV: (77.36, 126.43) and (55.32, 131.94)."""
+    mean, _ = history(steps=2)
+    assert mean.round(2).tolist() == [[20.0, 80.0], [77.36, 126.43], [55.32, 131.94]]
+
+
+@pytest.mark.parametrize("steps", [0, 1, 7, np.int64(3)])
+def test_the_prior_comes_first_and_every_step_is_kept(steps):
+    mean, cov = history(steps=steps)
+    assert mean.shape == (steps + 1, 2)
+    assert cov.shape == (steps + 1, 2, 2)
+    assert_array_equal(mean[0], BASE.prior.mean)
+    assert_array_equal(cov[0], BASE.prior.cov)
+
+
+def test_each_state_is_one_update_of_the_one_before():
+    mean, cov = history("B-EKF 1", steps=6)
+    for k in range(6):
+        state = FILTERS["B-EKF 1"](Gaussian(mean[k], cov[k]), BASE.z, MODEL)
+        assert_array_equal(mean[k + 1], state.mean)
+        assert_array_equal(cov[k + 1], state.cov)
+
+
+def test_a_thousand_steps_by_default():
+    assert run(lambda prior, z, model: prior, BASE.prior, BASE.z, MODEL).mean.shape == (1001, 2)
+
+
+def test_z_varies_takes_one_measurement_per_step():
+    z = BASE.z + np.arange(4)[:, None] * [1.0, 0.01]
+    got = history(z=z, steps=4, z_varies=True)
+    state = BASE.prior
+    for k in range(4):
+        state = EKF(state, z[k], MODEL)
+        assert_array_equal(got.mean[k + 1], state.mean)
+
+
+def test_a_measurement_that_varies_may_be_batched_too():
+    z = BASE.z + np.arange(4)[:, None, None] * np.ones((3, 1)) * [1.0, 0.01] + np.ones((3, 1))
+    got = history(z=z, steps=4, z_varies=True)
+    assert got.mean.shape == (5, 3, 2)
+    assert_allclose(got.mean[:, 1], history(z=z[:, 1], steps=4, z_varies=True).mean, rtol=1e-12)
+
+
+def test_no_step_needs_no_measurement():
+    """steps = 0 with z (0, m) is a history of the prior alone."""
+    mean, cov = history(z=np.zeros((0, 2)), steps=0, z_varies=True)
+    assert_array_equal(mean, BASE.prior.mean[None])
+    assert_array_equal(cov, BASE.prior.cov[None])
+
+
+@pytest.mark.parametrize("steps", [0, 2])
+def test_an_empty_batch_has_an_empty_history(steps):
+    """A chunk of a sweep that holds no member is no error."""
+    mean, cov = history(prior=Gaussian(np.zeros((0, 2)), np.zeros((0, 2, 2))), steps=steps)
+    assert mean.shape == (steps + 1, 0, 2)
+    assert cov.shape == (steps + 1, 0, 2, 2)
+
+
+@pytest.mark.parametrize("convert", [list, tuple, np.float32])
+def test_lists_and_other_precisions_are_taken(convert):
+    prior = Gaussian(convert([20.0, 80.0]), [[1e4, 0], [0, 1e4]])
+    mean, cov = history(prior=prior, z=BASE.z.tolist())
+    assert mean.dtype == cov.dtype == np.float64
+    assert_array_equal(mean, history().mean)
+
+
+def test_inputs_are_left_alone():
+    prior = Gaussian(BASE.prior.mean.copy(), BASE.prior.cov.copy())
+    z = BASE.z.copy()
+    got = history("B-EKF 4", prior=prior, z=z)
+    got.mean[:], got.cov[:] = 0.0, 0.0
+    assert_array_equal(prior.mean, BASE.prior.mean)
+    assert_array_equal(prior.cov, BASE.prior.cov)
+    assert_array_equal(z, BASE.z)
+
+
+# --- batches and options ------------------------------------------------------------------------
+
+PRIORS = isotropic(np.array([[20.0, 80.0], [60.0, -30.0], [-40.0, 10.0]]), [50.0, 60.0, 40.0])
+MEASUREMENTS = MODEL.h(np.array([[100.0, 100.0], [50.0, 20.0], [30.0, -70.0]]))
+NOISES = MODEL.R * np.array([1.0, 10.0, 1e3])[:, None, None]
+
+
+def pick(value, index):
+    """One member of a Gaussian, a model or an array."""
+    if isinstance(value, Gaussian):
+        return Gaussian(*(part[index] for part in value))
+    if isinstance(value, RangeBearing):
+        return RangeBearing(value.R[index])
+    return value[index]
+
+
+@pytest.mark.parametrize(
+    "batched",
+    [["prior"], ["z"], ["model"], ["bump"], ["prior", "z"], ["prior", "z", "model", "bump"]],
+    ids=" and ".join,
+)
+def test_any_argument_may_be_a_batch(batched):
+    """Members of the batch are those run alone; the other arguments are shared."""
+    shared = {"prior": BASE.prior, "z": BASE.z, "model": MODEL, "bump": 1.0}
+    many = {
+        "prior": PRIORS,
+        "z": MEASUREMENTS,
+        "model": RangeBearing(NOISES),
+        "bump": np.array([0.5, 1.0, 2.0]),
+    }
+
+    def go(arguments):
+        bump = arguments.pop("bump")
+        return run(partial(FILTERS["B-EKF 1"], bump=bump), **arguments, steps=4)
+
+    got = go(shared | {name: many[name] for name in batched})
+    assert got.mean.shape == (5, 3, 2)
+    assert got.cov.shape == (5, 3, 2, 2)
+    for i in range(3):
+        alone = go(shared | {name: pick(many[name], i) for name in batched})
+        assert_allclose(got.mean[:, i], alone.mean, rtol=1e-10)
+        assert_allclose(got.cov[:, i], alone.cov, rtol=0, atol=1e-13 * 1e4)
+
+
+def test_batch_axes_form_a_grid():
+    """Two priors by three noises by four bumps."""
+    prior = Gaussian(PRIORS.mean[:2, None, None], PRIORS.cov[:2, None, None])
+    bump = np.linspace(0.0, 3.0, 4)
+    model = RangeBearing(NOISES[:, None])
+    got = run(partial(FILTERS["B-EKF 1"], bump=bump), prior, BASE.z, model, steps=3)
+    assert got.mean.shape == (4, 2, 3, 4, 2)
+    alone = run(
+        partial(FILTERS["B-EKF 1"], bump=bump[3]), pick(PRIORS, 1), BASE.z, pick(model, (2, 0)), 3
+    )
+    assert_allclose(got.mean[:, 1, 2, 3], alone.mean, rtol=1e-10)
+
+
+@pytest.mark.parametrize("steps", [1, 2])
+@pytest.mark.parametrize("model", [MODEL, Linear(np.eye(2), np.eye(2))], ids=["curved", "linear"])
+def test_mean_and_covariance_have_the_same_batch_axes(model, steps):
+    """Five measurements are five members, also where every member has the same covariance."""
+    z = BASE.z + np.arange(5)[:, None] * [1.0, 0.01]
+    got = run(EKF, BASE.prior, z, model, steps)
+    assert got.mean.shape == (steps + 1, 5, 2)
+    assert got.cov.shape == (steps + 1, 5, 2, 2)
+    assert first_indefinite(got.cov).shape == (5,)
+
+
+def test_options_come_by_partial():
+    points = SigmaPoints(0.8, 2.0, 3.3, "symmetric")
+    got = run(partial(FILTERS["UKF"], points=points), BASE.prior, BASE.z, MODEL, 3)
+    state = BASE.prior
+    for k in range(3):
+        state = FILTERS["UKF"](state, BASE.z, MODEL, points=points)
+        assert_array_equal(got.mean[k + 1], state.mean)
+
+
+def test_a_batch_of_linear_models_with_one_prior():
+    """The members' H in front, for a filter that draws sigma points too; 2 n + 1 = 5 of them."""
+    rng = np.random.default_rng(0)
+    model = Linear(rng.normal(size=(5, 2, 2)), covariances(rng, (5,), 2))
+    prior, z = isotropic([1.0, 2.0], 3.0), np.array([0.5, -0.5])
+    got, wanted = (run(FILTERS[name], prior, z, model, 3) for name in ("UKF", "EKF"))
+    assert got.mean.shape == (4, 5, 2)
+    assert_allclose(got.mean, wanted.mean, rtol=1e-10)
+
+
+def test_a_member_that_fails_is_nan_from_there_and_alone():
+    """No warning, no exception: at the origin the EKF has no derivative."""
+    mean = PRIORS.mean.copy()
+    mean[1] = 0.0
+    healthy = history(prior=PRIORS)
+    got = history(prior=Gaussian(mean, PRIORS.cov))
+    for ours, wanted in zip(got, healthy, strict=True):
+        assert_array_equal(ours[:, [0, 2]], wanted[:, [0, 2]])
+        assert np.isnan(ours[1:, 1]).all()
+        assert np.isfinite(ours[0]).all()
+
+
+# --- definiteness -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "step"), [("mtSOF", 1), ("B-mtSOF", 23), ("EKF", -1)])
+def test_where_the_papers_filters_lose_definiteness(name, step):
+    """Sections V and VI: the mtSOF at its first update, the bumped one at the 23rd."""
+    assert first_indefinite(history(name, steps=1000).cov) == step
+
+
+def test_first_indefinite_counts_from_the_prior_and_per_member():
+    good, bad = np.eye(2), np.diag([1.0, -1.0])
+    cov = np.stack(
+        [
+            [good, bad, good, good],
+            [good, good, good, bad],
+            [good, bad, bad * np.nan, good],
+        ]
+    )
+    with np.errstate(all="ignore"):
+        assert first_indefinite(cov).tolist() == [-1, 0, 2, 1]
+
+
+def test_a_nan_covariance_is_not_definite():
+    cov = np.stack([np.eye(3), np.full((3, 3), np.nan), np.eye(3)])
+    assert first_indefinite(cov) == 1
+    assert first_indefinite(cov[:1]) == -1
+
+
+def test_a_singular_covariance_is_not_definite():
+    assert first_indefinite(np.stack([np.eye(2), np.ones((2, 2))])) == 1
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (4, 2, 3), (3,)])
+def test_first_indefinite_needs_a_history(shape):
+    with pytest.raises(ValueError, match=r"cov must have shape .steps \+ 1, ..., n, n.; found .*"):
+        first_indefinite(np.ones(shape))
+
+
+# --- what is refused, before any update ---------------------------------------------------------
+
+
+def never(prior, z, model):
+    raise AssertionError("the estimator was called before its inputs were checked")
+
+
+def covariance(*rows):
+    return Gaussian([20.0, 80.0], rows)
+
+
+REFUSED = {
+    # prior
+    "prior: a tuple": ({"prior": ([0.0, 0.0], np.eye(2))}, "prior", "tuple", "Gaussian"),
+    "prior: None": ({"prior": None}, "prior", "NoneType", "Gaussian"),
+    "prior: an array": ({"prior": np.zeros(2)}, "prior", "ndarray", "Gaussian"),
+    # mean
+    "mean: a number": ({"prior": Gaussian(1.0, np.eye(2))}, "prior.mean", r"\(\)", r"\.\.\., n"),
+    "mean: empty": ({"prior": Gaussian([], np.eye(2))}, "prior.mean", r"\(0,\)", r"\.\.\., n"),
+    "mean: ragged": (
+        {"prior": Gaussian([[1.0, 2.0], [3.0]], np.eye(2))},
+        "prior.mean",
+        "list",
+        "real numbers",
+    ),
+    "mean: NaN": (
+        {"prior": Gaussian([1.0, np.nan], np.eye(2))},
+        "prior.mean",
+        r"nan at index \(1,\)",
+        "finite",
+    ),
+    "mean: infinite": (
+        {"prior": Gaussian([-np.inf, 1.0], np.eye(2))},
+        "prior.mean",
+        r"-inf at index \(0,\)",
+        "finite",
+    ),
+    "mean: complex": (
+        {"prior": Gaussian([1j, 1.0], np.eye(2))},
+        "prior.mean",
+        "complex128",
+        "real numbers",
+    ),
+    "mean: strings": (
+        {"prior": Gaussian(["a", "b"], np.eye(2))},
+        "prior.mean",
+        "<U1",
+        "real numbers",
+    ),
+    "mean: booleans": (
+        {"prior": Gaussian([True, False], np.eye(2))},
+        "prior.mean",
+        "bool",
+        "real numbers",
+    ),
+    "mean: None": ({"prior": Gaussian(None, np.eye(2))}, "prior.mean", "object", "real numbers"),
+    "mean: one component": (
+        {"prior": Gaussian([1.0], np.eye(1))},
+        "prior.mean",
+        r"\(1,\)",
+        "a state of the model",
+    ),
+    "mean: three components": (
+        {"prior": Gaussian([1.0, 2.0, 3.0], np.eye(3))},
+        "prior.mean",
+        r"\(3,\)",
+        r"\.\.\., 2",
+    ),
+    "mean: not the linear model's": (
+        {"prior": Gaussian([1.0, 2.0, 3.0], np.eye(3)), "model": Linear(np.eye(2), np.eye(2))},
+        "prior.mean",
+        r"\(3,\)",
+        r"\.\.\., 2",
+    ),
+    # cov
+    "cov: a vector": ({"prior": covariance(1.0, 2.0)}, "prior.cov", r"\(2,\)", r"\.\.\., n, n"),
+    "cov: not square": (
+        {"prior": covariance([1.0, 0.0, 0.0], [0.0, 1.0, 0.0])},
+        "prior.cov",
+        r"\(2, 3\)",
+        r"\.\.\., 2, 2",
+    ),
+    "cov: another size": (
+        {"prior": Gaussian([20.0, 80.0], np.eye(3))},
+        "prior.cov",
+        r"\(3, 3\)",
+        r"\.\.\., 2, 2",
+    ),
+    "cov: NaN": (
+        {"prior": covariance([1.0, 0.0], [0.0, np.nan])},
+        "prior.cov",
+        r"nan at index \(1, 1\)",
+        "finite",
+    ),
+    "cov: infinite": (
+        {"prior": covariance([np.inf, 0.0], [0.0, 1.0])},
+        "prior.cov",
+        r"inf at index \(0, 0\)",
+        "finite",
+    ),
+    "cov: complex": ({"prior": covariance([1j, 0], [0, 1])}, "prior.cov", "complex128", "real"),
+    "cov: asymmetric": (
+        {"prior": covariance([2.0, 0.5], [0.0, 2.0])},
+        "prior.cov",
+        "difference of 0.5",
+        "symmetric",
+    ),
+    "cov: indefinite": (
+        {"prior": covariance([1.0, 2.0], [2.0, 1.0])},
+        "prior.cov",
+        r"eigenvalue (of )?-1",
+        "positive semidefinite",
+    ),
+    "cov: negative": (
+        {"prior": covariance([-1.0, 0.0], [0.0, 1.0])},
+        "prior.cov",
+        r"eigenvalue (of )?-1",
+        "positive semidefinite",
+    ),
+    "cov: one bad member": (
+        {"prior": Gaussian(np.ones((2, 2)), np.stack([np.eye(2), -np.eye(2)]))},
+        "prior.cov",
+        r"eigenvalue (of )?-1",
+        "positive semidefinite",
+    ),
+    "cov: indefinite in small units": (
+        {"prior": covariance([1e-20, 2e-10], [2e-10, 1.0])},
+        "prior.cov",
+        r"eigenvalue (of )?-",
+        "positive semidefinite",
+    ),
+    # z
+    "z: a number": ({"z": 1.0}, "z", r"\(\)", r"\.\.\., m"),
+    "z: three components": ({"z": [1.0, 2.0, 3.0]}, "z", r"\(3,\)", "m = 2 as in model.R"),
+    "z: one component": ({"z": np.ones((2, 1))}, "z", r"\(2, 1\)", "m = 2 as in model.R"),
+    "z: NaN": ({"z": [1.0, np.nan]}, "z", r"nan at index \(1,\)", "finite"),
+    "z: infinite": ({"z": [[1.0, 2.0], [np.inf, 0]]}, "z", r"inf at index \(1, 0\)", "finite"),
+    "z: complex": ({"z": [1.0, 1j]}, "z", "complex128", "real numbers"),
+    "z: strings": ({"z": ["1.0", "2.0"]}, "z", "<U3", "real numbers"),
+    "z: ragged": ({"z": [[1.0, 2.0], [3.0]]}, "z", "list", "real numbers"),
+    "z: None": ({"z": None}, "z", "object", "real numbers"),
+    # z_varies
+    "z_varies: too few": (
+        {"z": np.ones((4, 2)), "z_varies": True},
+        "z",
+        r"\(4, 2\)",
+        r"steps, \.\.\., m.* 5 steps",
+    ),
+    "z_varies: too many": (
+        {"z": np.ones((6, 3, 2)), "z_varies": True},
+        "z",
+        r"\(6, 3, 2\)",
+        r"steps, \.\.\., m.* 5 steps",
+    ),
+    "z_varies: steps last": (
+        {"z": np.ones((3, 5, 2)), "z_varies": True},
+        "z",
+        r"\(3, 5, 2\)",
+        r"steps, \.\.\., m.* 5 steps",
+    ),
+    "z_varies: one measurement": (
+        {"z": np.ones(2), "z_varies": True},
+        "z",
+        r"\(2,\)",
+        r"steps, \.\.\., m",
+    ),
+    "z_varies: wrong m": (
+        {"z": np.ones((5, 3)), "z_varies": True},
+        "z",
+        r"\(5, 3\)",
+        "m = 2 as in model.R",
+    ),
+    # steps
+    "steps: negative": ({"steps": -1}, "steps", "-1", "integer of at least 0"),
+    "steps: a float": ({"steps": 5.0}, "steps", "5.0", "integer of at least 0"),
+    "steps: a bool": ({"steps": True}, "steps", "True", "integer of at least 0"),
+    "steps: a numpy bool": ({"steps": np.True_}, "steps", "True", "integer of at least 0"),
+    "steps: a string": ({"steps": "5"}, "steps", "'5'", "integer of at least 0"),
+    "steps: None": ({"steps": None}, "steps", "None", "integer of at least 0"),
+    # batch axes
+    "batch: prior against z": (
+        {"prior": PRIORS, "z": np.ones((2, 2))},
+        r"prior.mean \(3,\).*z \(2,\)",
+        "prior.mean",
+        "must broadcast",
+    ),
+    "batch: prior against R": (
+        {"prior": PRIORS, "model": RangeBearing(NOISES[:2])},
+        r"prior.mean \(3,\).*model.R \(2,\)",
+        "model.R",
+        "must broadcast",
+    ),
+    "batch: mean against cov": (
+        {"prior": Gaussian(np.ones((3, 2)), np.stack([np.eye(2)] * 2))},
+        r"prior.mean \(3,\).*prior.cov \(2,\)",
+        "prior.cov",
+        "must broadcast",
+    ),
+    "batch: varying z against prior": (
+        {"prior": PRIORS, "z": np.ones((5, 2, 2)), "z_varies": True},
+        r"prior.mean \(3,\).*z \(2,\)",
+        "z",
+        "must broadcast",
+    ),
+    "batch: prior against H": (
+        {"prior": PRIORS, "model": Linear(np.ones((2, 2, 2)), np.eye(2))},
+        r"prior.mean \(3,\).*model.jacobian \(2,\)",
+        "jacobian",
+        "must broadcast",
+    ),
+}
+
+
+@pytest.mark.parametrize(("changes", "argument", "found", "needed"), REFUSED.values(), ids=REFUSED)
+def test_bad_input_is_refused_before_any_update(changes, argument, found, needed):
+    """A ValueError names the argument, what was found and what is needed."""
+    arguments = {"prior": BASE.prior, "z": BASE.z, "model": MODEL, "steps": 5} | changes
+    with pytest.raises(ValueError, match=argument) as error:
+        run(never, **arguments)
+    assert error.match(f"found.*{found}")
+    assert error.match(needed)
+
+
+@pytest.mark.parametrize("estimator", ["EKF", None, {"name": "EKF"}])
+def test_an_estimator_that_cannot_be_called_is_refused(estimator):
+    with pytest.raises(TypeError, match=r"estimator must be callable.*FILTERS.*found"):
+        run(estimator, BASE.prior, BASE.z, MODEL)
+
+
+def test_an_option_that_the_filter_lacks_is_refused():
+    with pytest.raises(TypeError, match="unknown options"):
+        run(partial(EKF, bump=1.0), BASE.prior, BASE.z, MODEL)
+
+
+@pytest.mark.parametrize("cov", [np.zeros((2, 2)), np.ones((2, 2)), np.diag([0.0, 1.0])])
+def test_a_semidefinite_prior_is_taken(cov):
+    """Nothing is learnt about what is already known exactly."""
+    got = history(prior=Gaussian([20.0, 80.0], cov), steps=1)
+    null = np.linalg.eigh(cov)[1][:, 0]
+    assert_allclose(null @ (got.mean[1] - got.mean[0]), 0.0, atol=1e-10)
+
+
+def test_any_model_with_the_protocols_names_will_do():
+    """A model is what has R, h and jacobian."""
+    model = SimpleNamespace(R=MODEL.R, h=MODEL.h, jacobian=MODEL.jacobian)
+    assert_array_equal(history(model=model).mean, history().mean)

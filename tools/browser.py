@@ -1,0 +1,134 @@
+"""The built pages in a headless Chromium that can reach nothing but them."""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import yaml
+from playwright.sync_api import Browser, Page, Route, sync_playwright
+
+ROOT = Path(__file__).resolve().parent.parent
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+ARGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+# The theme's own storage keys. Without them it follows the system, as on a first visit.
+REMEMBER = "localStorage.setItem('mode', '{0}'); localStorage.setItem('theme', '{0}')"
+SETTLED = "async () => { await window.MathJax?.startup?.promise; await document.fonts.ready }"
+
+
+def toc() -> list[str]:
+    """Every page of _toc.yml, in reading order, without ending."""
+    return list(_files(yaml.safe_load((ROOT / "_toc.yml").read_text(encoding="utf-8"))))
+
+
+def _files(node: Any) -> Iterator[str]:
+    if isinstance(node, dict):
+        for key, value in node.items():
+            if key in ("root", "file"):
+                yield value
+            else:
+                yield from _files(value)
+    elif isinstance(node, list):
+        for item in node:
+            yield from _files(item)
+
+
+def find() -> str | None:
+    """A Chromium of this machine."""
+    return next(filter(None, map(shutil.which, NAMES)), None)
+
+
+class _Handler(SimpleHTTPRequestHandler):
+    def log_message(self, format: str, *args: object) -> None:
+        """Say nothing."""
+
+
+class _Server(ThreadingHTTPServer):
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser may hang up; what it then lacks, it reports itself."""
+
+
+@contextmanager
+def _serve(folder: Path) -> Iterator[str]:
+    server = _Server(("127.0.0.1", 0), partial(_Handler, directory=str(folder)))
+    thread = Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}"
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
+
+
+@dataclass
+class Visit:
+    """A loaded page, and what went wrong while it loaded."""
+
+    page: Page
+    outside: list[str] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Site:
+    """A browser, and the address of the built pages."""
+
+    browser: Browser
+    address: str
+
+    @contextmanager
+    def visit(self, name: str, width: int = 1280, theme: str = "") -> Iterator[Visit]:
+        """Load a page and wait for MathJax; requests to any other host are recorded and refused."""
+        context = self.browser.new_context(
+            viewport={"width": width, "height": 900}, color_scheme=theme or "light"
+        )
+        if theme:
+            context.add_init_script(REMEMBER.format(theme))
+        visit = Visit(context.new_page())
+        home = self.address + "/"
+
+        def guard(route: Route) -> None:
+            if route.request.url.startswith(home):
+                route.continue_()
+            else:
+                visit.outside.append(route.request.url)
+                route.abort()
+
+        def listen(message: Any) -> None:
+            if message.type == "error" and message.location["url"] not in visit.outside:
+                visit.errors.append(f"console: {message.text} ({message.location['url']})")
+
+        context.route("**/*", guard)
+        visit.page.on("pageerror", lambda error: visit.errors.append(f"script: {error}"))
+        visit.page.on("console", listen)
+        try:
+            visit.page.goto(f"{home}{name}.html")
+            visit.page.evaluate(SETTLED)
+            yield visit
+        finally:
+            context.close()
+
+
+@contextmanager
+def site(folder: Path) -> Iterator[Site]:
+    """Serve a folder of pages on this machine alone, with a browser to look at them."""
+    with _serve(folder) as address, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=find(), args=ARGS)
+        try:
+            yield Site(browser, address)
+        finally:
+            browser.close()
