@@ -105,43 +105,36 @@ def test_inputs_are_left_alone():
 # --- batches and options ------------------------------------------------------------------------
 
 PRIORS = isotropic(np.array([[20.0, 80.0], [60.0, -30.0], [-40.0, 10.0]]), [50.0, 60.0, 40.0])
-MEASUREMENTS = MODEL.h(np.array([[100.0, 100.0], [50.0, 20.0], [30.0, -70.0]]))
 NOISES = MODEL.R * np.array([1.0, 10.0, 1e3])[:, None, None]
 
 
-def pick(value, index):
-    """One member of a Gaussian, a model or an array."""
-    if isinstance(value, Gaussian):
-        return Gaussian(*(part[index] for part in value))
-    if isinstance(value, RangeBearing):
-        return RangeBearing(value.R[index])
-    return value[index]
+FIVE = np.linspace(0.5, 2.5, 5)  # as many members as two states have sigma points
+MANY = {
+    "mean": BASE.prior.mean * FIVE[:, None],
+    "cov": BASE.prior.cov * FIVE[:, None, None],
+    "z": BASE.z * FIVE[:, None] * [1.0, 0.4],
+    "R": MODEL.R * FIVE[:, None, None],
+    "bump": FIVE,
+}
 
 
+@pytest.mark.parametrize("name", ["B-EKF 1", "B-UKF"])
 @pytest.mark.parametrize(
-    "batched",
-    [["prior"], ["z"], ["model"], ["bump"], ["prior", "z"], ["prior", "z", "model", "bump"]],
-    ids=" and ".join,
+    "batched", [[key] for key in MANY] + [["mean", "cov"], ["z", "bump"], [*MANY]], ids=" ".join
 )
-def test_any_argument_may_be_a_batch(batched):
+def test_any_argument_may_be_a_batch(name, batched):
     """Members of the batch are those run alone; the other arguments are shared."""
-    shared = {"prior": BASE.prior, "z": BASE.z, "model": MODEL, "bump": 1.0}
-    many = {
-        "prior": PRIORS,
-        "z": MEASUREMENTS,
-        "model": RangeBearing(NOISES),
-        "bump": np.array([0.5, 1.0, 2.0]),
-    }
+    shared = {"mean": BASE.prior.mean, "cov": BASE.prior.cov, "z": BASE.z, "R": MODEL.R, "bump": 1}
 
-    def go(arguments):
-        bump = arguments.pop("bump")
-        return run(partial(FILTERS["B-EKF 1"], bump=bump), **arguments, steps=4)
+    def go(mean, cov, z, R, bump):
+        estimator = partial(FILTERS[name], bump=bump)
+        return run(estimator, Gaussian(mean, cov), z, RangeBearing(R), 4)
 
-    got = go(shared | {name: many[name] for name in batched})
-    assert got.mean.shape == (5, 3, 2)
-    assert got.cov.shape == (5, 3, 2, 2)
-    for i in range(3):
-        alone = go(shared | {name: pick(many[name], i) for name in batched})
+    got = go(**shared | {key: MANY[key] for key in batched})
+    assert got.mean.shape == (5, 5, 2)
+    assert got.cov.shape == (5, 5, 2, 2)
+    for i in range(5):
+        alone = go(**shared | {key: MANY[key][i] for key in batched})
         assert_allclose(got.mean[:, i], alone.mean, rtol=1e-10)
         assert_allclose(got.cov[:, i], alone.cov, rtol=0, atol=1e-13 * 1e4)
 
@@ -153,8 +146,9 @@ def test_batch_axes_form_a_grid():
     model = RangeBearing(NOISES[:, None])
     got = run(partial(FILTERS["B-EKF 1"], bump=bump), prior, BASE.z, model, steps=3)
     assert got.mean.shape == (4, 2, 3, 4, 2)
+    one = Gaussian(PRIORS.mean[1], PRIORS.cov[1])
     alone = run(
-        partial(FILTERS["B-EKF 1"], bump=bump[3]), pick(PRIORS, 1), BASE.z, pick(model, (2, 0)), 3
+        partial(FILTERS["B-EKF 1"], bump=bump[3]), one, BASE.z, RangeBearing(NOISES[2]), steps=3
     )
     assert_allclose(got.mean[:, 1, 2, 3], alone.mean, rtol=1e-10)
 

@@ -17,7 +17,7 @@ from navfilters.linalg import (
     symmetric_root,
 )
 
-entries = st.floats(-10, 10)
+entries = st.floats(-10, 10).map(lambda value: round(value, 6))  # no subnormal numbers
 sizes = pytest.mark.parametrize("n", [1, 2, 3, 4])
 
 
@@ -137,8 +137,7 @@ def test_definiteness_is_the_sign_of_the_smallest_eigenvalue(n, data):
     A = (B + B.T) / 2
     w = np.linalg.eigvalsh(A).min()
     assume(abs(w) > 1e-10)
-    with np.errstate(over="ignore"):  # a subnormal pivot
-        assert is_positive_definite(A) == (w > 0)
+    assert is_positive_definite(A) == (w > 0)
 
 
 @sizes
@@ -223,9 +222,9 @@ def test_right_divide_undoes_the_product(m, data):
     """(X A) A^-1 = X within the condition number's rounding."""
     A = data.draw(square(m))
     X = data.draw(arrays(np.float64, (2, m), elements=entries))
-    assume(np.linalg.det(A) != 0)
-    condition = np.linalg.cond(A)
-    assume(condition < 1e6)
+    w = np.linalg.svd(A)[1]
+    assume(w[0] < 1e6 * w[-1])
+    condition = w[0] / w[-1]
     assert_allclose(right_divide(X @ A, A), X, rtol=0, atol=1e-13 * condition)
 
 

@@ -293,3 +293,18 @@ def test_a_batch_of_noises_broadcasts_with_the_prior(function):
     for i, j in np.ndindex(4, 5):
         wanted = function(Gaussian(p.mean[i, 0], p.cov[i, 0]), RangeBearing(R[j]))
         assert_allclose(got.P_zz[i, j], wanted.P_zz, rtol=1e-12)
+
+
+@pytest.mark.parametrize("function", [linearized, second_order, unscented])
+@pytest.mark.parametrize("batched", ["mean", "cov"])
+@pytest.mark.parametrize("members", [3, 5])
+def test_a_batch_of_means_or_of_covariances_alone(function, batched, members):
+    """One half of the prior shared by all members, 2 n + 1 = 5 of them included."""
+    many, model = prior(shape=(members,)), bearing_model()
+    shared = Gaussian(many.mean[0], many.cov[0])
+    got = function(shared._replace(**{batched: getattr(many, batched)}), model)
+    for i in range(members):
+        single = function(shared._replace(**{batched: getattr(many, batched)[i]}), model)
+        for ours, theirs in zip(got, single, strict=True):
+            stacked = np.broadcast_to(ours, (members, *theirs.shape))
+            assert_allclose(stacked[i], theirs, rtol=1e-11, atol=1e-12)

@@ -35,16 +35,35 @@ def test_rounding_is_no_asymmetry():
         validation.covariance("P", slightly + np.triu(np.full((2, 2), 1e-8), 1), definite=True)
 
 
+UNITS = pytest.mark.parametrize("units", [(1.0, 1.0), (1e-9, 1e9), (1e12, 1e-3)])
+
+
 @pytest.mark.parametrize("scale", [1e-150, 1e-12, 1.0, 1e12, 1e150])
-@pytest.mark.parametrize("units", [(1.0, 1.0), (1e-9, 1e9), (1e12, 1e-3)])
+@UNITS
 @pytest.mark.parametrize("correlation", [0.0, 0.999, -0.999999])
 def test_units_do_not_decide_definiteness(scale, units, correlation):
-    D = np.sqrt(scale) * np.diag(units)
-    P = D @ np.array([[1.0, correlation], [correlation, 1.0]]) @ D
+    square = scale * np.outer(units, units)
+    P = square * np.array([[1.0, correlation], [correlation, 1.0]])
     assert_array_equal(validation.covariance("P", P, definite=True), P)
-    indefinite = D @ np.array([[1.0, 1.001], [1.001, 1.0]]) @ D
+    indefinite = square * np.array([[1.0, 1.001], [1.001, 1.0]])
     with pytest.raises(ValueError, match="P must be symmetric positive semidefinite"):
         validation.covariance("P", indefinite, definite=False)
+
+
+@UNITS
+def test_units_do_not_decide_symmetry(units):
+    """Correlations of 0.5 and 0 across the diagonal, beside a component in much smaller units."""
+    scale = np.outer([1e6, *units], [1e6, *units])
+    P = scale * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])
+    with pytest.raises(ValueError, match="P must be symmetric; found a difference"):
+        validation.covariance("P", P, definite=False)
+
+
+@pytest.mark.parametrize("entry", [1e-12, 1e-8, 1.0, 1e6])
+def test_what_does_not_vary_does_not_covary(entry):
+    """[[0, c], [c, 1]] is indefinite for any c, in any units."""
+    with pytest.raises(ValueError, match="P must be symmetric positive semidefinite"):
+        validation.covariance("P", np.array([[0.0, entry], [entry, 1.0]]), definite=False)
 
 
 @pytest.mark.parametrize("P", [np.zeros((2, 2)), np.ones((2, 2)), np.diag([1.0, 0.0])])

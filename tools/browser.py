@@ -26,6 +26,7 @@ ARGS = [
 ]
 # The theme's own storage keys. Without them it follows the system, as on a first visit.
 REMEMBER = "localStorage.setItem('mode', '{0}'); localStorage.setItem('theme', '{0}')"
+STILL = "*, ::before, ::after { transition: none !important; animation: none !important }"
 SETTLED = "async () => { await window.MathJax?.startup?.promise; await document.fonts.ready }"
 
 
@@ -116,7 +117,10 @@ class Site:
         visit.page.on("pageerror", lambda error: visit.errors.append(f"script: {error}"))
         visit.page.on("console", listen)
         try:
-            visit.page.goto(f"{home}{name}.html")
+            response = visit.page.goto(f"{home}{name}.html")
+            if response is None or not response.ok:
+                raise FileNotFoundError(f"{name}.html is not built: run `make book`")
+            visit.page.add_style_tag(content=STILL)
             visit.page.evaluate(SETTLED)
             yield visit
         finally:

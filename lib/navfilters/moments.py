@@ -183,9 +183,11 @@ def sigma_points(prior: Gaussian, points: SigmaPoints) -> Array:
     perea2007, Eq. (21).
     """
     xp = prior.cov.__array_namespace__()
-    gamma, *_ = points.weights(prior.mean.shape[-1])
+    n = prior.mean.shape[-1]
+    gamma, *_ = points.weights(n)
     S = xp.asarray(gamma)[..., None, None] * ROOTS[points.root](prior.cov)
-    columns = xp.moveaxis(S, -1, 0)
+    batch = xp.broadcast_shapes(S.shape[:-2], prior.mean.shape[:-1])
+    columns = xp.moveaxis(xp.broadcast_to(S, (*batch, n, n)), -1, 0)
     return prior.mean + xp.concat([xp.zeros_like(columns[:1]), columns, -columns], axis=0)
 
 
@@ -216,8 +218,10 @@ def unscented(
     perea2007, Eqs. (21)-(25); its Eq. (26) is empty.
     """
     X = sigma_points(prior, points)
+    xp = X.__array_namespace__()
+    missing = model.R.ndim - X.ndim  # batch axes that only the model has go behind the points' axis
+    X = xp.reshape(X, (X.shape[0], *(1,) * missing, *X.shape[1:]))
     Z = model.h(X)
-    xp = Z.__array_namespace__()
     _, _, W0_c, W_i = (xp.asarray(w) for w in points.weights(prior.mean.shape[-1]))
     # The weights sum to one. Summing differences keeps the digits that a large negative W0 would
     # cancel.

@@ -55,7 +55,7 @@ class MeasurementModel(Protocol):
 
     @property
     def R(self) -> Array:
-        """Measurement noise covariance, (..., m, m)."""
+        """Measurement noise covariance, (..., m, m), with all batch axes that the model has."""
 
     def h(self, x: Array) -> Array:
         """Measurement of the state x (..., n), without noise: (..., m)."""

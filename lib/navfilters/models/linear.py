@@ -31,9 +31,9 @@ class Linear:
     def __post_init__(self) -> None:
         H = validation.real_array("H", self.H, "m, n")
         R = validation.covariance("R", self.R, H.shape[-2], definite=True)
-        validation.batch(H=H.shape[:-2], R=R.shape[:-2])
+        batch = validation.batch(H=H.shape[:-2], R=R.shape[:-2])
         object.__setattr__(self, "H", H)
-        object.__setattr__(self, "R", R)
+        object.__setattr__(self, "R", np.broadcast_to(R, (*batch, *R.shape[-2:])))
 
     def h(self, x: Array) -> Array:
         """H x, (..., m).

@@ -1,0 +1,101 @@
+"""The stored notebooks: executed once from top to bottom, and free of what only one machine has."""
+
+import json
+import re
+
+import nbformat
+import pytest
+from browser import ROOT, toc
+
+PATHS = sorted((ROOT / "book").rglob("*.ipynb"))
+CHAPTERS = [p for p in PATHS if p.parent.name in ("foundations", "range-bearing")]
+METADATA = {
+    "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
+    "language_info": {"name": "python"},
+}
+# A path of one machine, the address of an object, an instant.
+LOCAL = re.compile(
+    r"(?<!\w)/(home|Users|root|tmp|work|opt)/\w|\b[A-Z]:\\|\bat 0x[0-9a-f]+|\d{4}-\d\d-\d\dT\d\d:"
+)
+
+
+def label(path):
+    return path.relative_to(ROOT / "book").with_suffix("").as_posix()
+
+
+every_notebook = pytest.mark.parametrize("path", PATHS, ids=label)
+
+
+def code_cells(path):
+    return [c for c in nbformat.read(path, as_version=4).cells if c.cell_type == "code"]
+
+
+def outputs(path):
+    return [output for cell in code_cells(path) for output in cell.outputs]
+
+
+def texts(path):
+    """What a notebook stores besides pictures: metadata, sources, outputs."""
+    notebook = nbformat.read(path, as_version=4)
+    yield json.dumps(notebook.metadata)
+    for cell in notebook.cells:
+        yield from (json.dumps(cell.metadata), cell.source)
+        for output in cell.get("outputs", ()):
+            yield from (json.dumps(output.get("metadata", {})), output.get("text", ""))
+            data = output.get("data", {})
+            yield from (data[kind] for kind in data if kind.startswith("text/"))
+
+
+def test_the_table_of_contents_lists_every_notebook_and_every_page_exists():
+    listed = {name for name in toc() if (ROOT / f"{name}.ipynb").is_file()}
+    assert listed == {f"book/{label(path)}" for path in PATHS}
+    assert len(toc()) == len(set(toc()))
+    assert [n for n in toc() if n not in listed and not (ROOT / f"{n}.md").is_file()] == []
+
+
+@every_notebook
+def test_it_is_valid_with_cells_of_unique_ids(path):
+    notebook = nbformat.read(path, as_version=4)
+    nbformat.validate(notebook)
+    ids = [cell.id for cell in notebook.cells]
+    assert len(ids) == len(set(ids))
+
+
+@every_notebook
+def test_it_was_executed_once_from_top_to_bottom(path):
+    counts = [cell.execution_count for cell in code_cells(path) if cell.source.strip()]
+    assert counts == list(range(1, len(counts) + 1))
+
+
+@every_notebook
+def test_it_stores_neither_errors_nor_warnings(path):
+    bad = [o for o in outputs(path) if o.output_type == "error" or o.get("name") == "stderr"]
+    assert bad == []
+
+
+@every_notebook
+def test_it_stores_nothing_of_the_machine_that_ran_it(path):
+    notebook = nbformat.read(path, as_version=4)
+    assert notebook.metadata == METADATA
+    assert [c.id for c in notebook.cells if {"execution", "ExecuteTime"} & set(c.metadata)] == []
+    assert [m.group() for text in texts(path) for m in LOCAL.finditer(text)] == []
+
+
+@every_notebook
+def test_it_is_small(path):
+    assert path.stat().st_size < 1.5 * 2**20
+    assert [c.id for c in code_cells(path) if len(c.source.splitlines()) > 40] == []
+
+
+@pytest.mark.parametrize("path", CHAPTERS, ids=label)
+def test_it_ends_with_exercises_and_their_hidden_solutions(path):
+    section, solutions = "", 0
+    for cell in nbformat.read(path, as_version=4).cells:
+        headings = (
+            re.findall(r"^## (.+)$", cell.source, re.M) if cell.cell_type == "markdown" else []
+        )
+        if headings:
+            section, solutions = headings[-1], 0
+        solutions += cell.cell_type == "code" and "hide-cell" in cell.metadata.get("tags", ())
+    assert section.startswith("Exercises")
+    assert solutions >= 2

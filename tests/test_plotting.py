@@ -1,0 +1,104 @@
+"""One hand for every figure: styles that differ, labels that do not touch."""
+
+from itertools import combinations
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+mpl.use("Agg")
+from matplotlib import pyplot as plt
+
+from navfilters import FILTERS, plotting
+from navfilters.plotting import STYLES
+
+
+@pytest.fixture
+def ax():
+    figure, ax = plt.subplots(figsize=(6, 4))
+    yield ax
+    plt.close(figure)
+
+
+def test_every_filter_has_a_style():
+    assert set(FILTERS) <= set(STYLES)
+
+
+@pytest.mark.parametrize(("one", "other"), list(combinations(STYLES, 2)))
+def test_no_two_filters_look_alike(one, other):
+    a, b = STYLES[one], STYLES[other]
+    assert a != b
+    if a["color"] == b["color"]:
+        assert a["linestyle"] != b["linestyle"]
+        assert a["marker"] != b["marker"]
+
+
+@pytest.mark.parametrize(
+    "ends",
+    [[0.2, 0.5, 0.8], [0.5] * 4, [0.98, 0.99, 1.0], [0.0, 0.0, 0.01], [-3.0, 0.5, 4.0]],
+    ids=["apart", "equal", "top", "bottom", "outside"],
+)
+def test_labels_of_curves_are_apart_and_inside(ax, ends):
+    for i, end in enumerate(ends):
+        ax.plot([0, 1], [0.5, end], label=f"curve {i}")
+    ax.set(xlim=(0, 1), ylim=(0, 1))
+    plotting.label_ends(ax, gap=11.0, names={"curve 0": "first"})
+    assert {t.get_text() for t in ax.texts} == {
+        "first",
+        *(f"curve {i}" for i in range(1, len(ends))),
+    }
+    heights = np.sort([t.xy[1] for t in ax.texts])
+    assert np.diff(heights).min() * ax.bbox.height * 72 / ax.figure.dpi > 11.0 - 0.1
+    assert heights[0] >= -1e-9
+    assert heights[-1] <= 1 + 1e-9
+
+
+def test_labels_skip_what_has_no_name_or_no_end(ax):
+    ax.plot([0, 1], [0, 1])
+    ax.plot([0, 1], [np.nan, np.nan], label="nothing")
+    ax.plot([0, 1, 2], [0.5, 0.5, np.nan], label="ends early")
+    plotting.label_ends(ax)
+    assert [t.get_text() for t in ax.texts] == ["ends early"]
+
+
+def test_ellipse_points_lie_on_the_ellipse():
+    mean, cov = np.array([3.0, -1.0]), np.array([[4.0, 1.9], [1.9, 1.0]])
+    points = plotting.ellipse_points(mean, cov, 2.5, 50)
+    assert points.shape == (50, 2)
+    away = points - mean
+    assert_allclose(np.einsum("ki,ij,kj->k", away, np.linalg.inv(cov), away), 2.5**2, rtol=1e-10)
+    assert_allclose(points[0], points[-1], atol=1e-12)
+
+
+def test_only_exact_zeros_go_to_the_floor():
+    found = plotting.at_floor([0, -0.0, 1e-300, 2, np.nan], 1e-20)
+    assert_array_equal(found, [1e-20, 1e-20, 1e-300, 2, np.nan])
+
+
+def test_failures_are_marked_and_counted(ax):
+    assert plotting.mark_failures(ax, [1, 2, 3, 4], [0, 1, 0, 1], "UKF", row=2) == 2
+    (marks,) = ax.get_lines()
+    assert_array_equal(marks.get_xdata(), [2, 4])
+    assert marks.get_color() == STYLES["UKF"]["color"]
+    assert plotting.mark_failures(ax, [1, 2], [False, False], "UKF") == 0
+
+
+@pytest.mark.parametrize("log_k", [True, False])
+def test_a_curve_wears_its_style_and_few_markers(ax, log_k):
+    k = np.arange(1, 1001)
+    plotting.error_axes(ax, log_k=log_k)
+    plotting.curve(ax, "B-EKF 2", k, 1.0 / k, linewidth=3)
+    (line,) = ax.get_lines()
+    marks = line.get_markevery()
+    assert line.get_label() == "B-EKF 2"
+    assert line.get_marker() == STYLES["B-EKF 2"]["marker"]
+    assert line.get_linewidth() == 3
+    assert 8 <= len(marks) <= 12
+    assert {marks[0], marks[-1]} == {0, 999}
+
+
+def test_panels_are_a_flat_list():
+    figure, axes = plotting.panels(2, 3)
+    assert len(axes) == 6
+    plt.close(figure)
