@@ -128,13 +128,7 @@ def label_ends(ax: Axes, *, gap: float = 11.0, names: Mapping[str, str] | None =
         height = ax.transData.transform((x[last], y[last]))[1] / scale
         ends.append((min(max(height, low), high), line))
     ends.sort(key=lambda end: end[0])
-    heights = [end[0] for end in ends]
-    for _ in range(100):  # push neighbours apart until none touch
-        for i in range(len(heights) - 1):
-            lack = gap - (heights[i + 1] - heights[i])
-            if lack > 0:
-                heights[i] -= lack / 2
-                heights[i + 1] += lack / 2
+    heights = _spread([end[0] for end in ends], gap, low, high)
     for height, (_, line) in zip(heights, ends, strict=True):
         label = str(line.get_label())
         ax.annotate(
@@ -148,6 +142,22 @@ def label_ends(ax: Axes, *, gap: float = 11.0, names: Mapping[str, str] | None =
             va="center",
             annotation_clip=False,
         )
+
+
+def _spread(heights: Sequence[float], gap: float, low: float, high: float) -> list[float]:
+    """Sorted heights moved as little as it takes to be a gap apart between low and high."""
+    placed = list(heights)
+    for _ in range(200):
+        for i in range(len(placed) - 1):
+            lack = gap - (placed[i + 1] - placed[i])
+            if lack > 0:
+                placed[i] -= lack / 2
+                placed[i + 1] += lack / 2
+        placed = [
+            min(max(y, low + i * gap), high - (len(placed) - 1 - i) * gap)
+            for i, y in enumerate(placed)
+        ]
+    return placed
 
 
 def ellipse_points(mean: Any, cov: Any, size: float = 1.0, points: int = 400) -> np.ndarray:
@@ -208,6 +218,8 @@ def mark_failures(ax: Axes, x: Any, failed: Any, name: str, row: int = 0) -> int
         How many failed.
     """
     x, failed = np.asarray(x), np.asarray(failed, bool)
+    if not failed.any():
+        return 0  # an unclipped line without points would break the figure's layout
     ax.plot(
         x[failed],
         np.full(failed.sum(), 0.985 - 0.03 * row),
@@ -252,3 +264,49 @@ def panels(rows: int, columns: int, **keywords: Any) -> tuple[Any, Sequence[Axes
     """
     figure, axes = plt.subplots(rows, columns, squeeze=False, **keywords)
     return figure, list(axes.flat)
+
+
+_FAMILIES = (
+    ("EKF", "B-EKF 1", "B-EKF 2", "B-EKF 3", "B-EKF 4"),
+    ("mtSOF", "B-mtSOF"),
+    ("UKF", "B-UKF", "UKFz"),
+)
+
+
+def sweep_panels(
+    x: Any, results: Mapping[str, Any], xlabel: str, *, floor: float, log_x: bool = True
+) -> tuple[Any, Sequence[Axes]]:
+    """The indicator I of ten filters over a sweep, one panel for each family, one axis for all.
+
+    Exact zeros are drawn at the floor; failed members as crosses on the upper edge, and counted there.
+
+    Parameters
+    ----------
+    x : array-like (k,)
+    results : mapping of str to array (k,)
+        I of each filter; NaN where it failed.
+    xlabel : str
+    floor : float
+        Lower limit of the vertical axis.
+    log_x : bool
+
+    Returns
+    -------
+    tuple of Figure, list of Axes
+    """
+    figure, axes = panels(3, 1, figsize=(7.0, 8.2), sharex=True, sharey=True)
+    for ax, family in zip(axes, _FAMILIES, strict=True):
+        ax.set(yscale="log", ylim=(floor, 30), ylabel="improvement I", xlim=(min(x), max(x)))
+        if log_x:
+            ax.set_xscale("log")
+        ax.axhline(1.0, color=BOUND, linewidth=1)
+        for row, name in enumerate(family):
+            y = np.asarray(results[name], float)
+            curve(ax, name, x, at_floor(y, floor), linewidth=1.3)
+            count = mark_failures(ax, x, np.isnan(y), name, row)
+            if count:
+                ax.set_title(f"{name}: {count} of {y.size} failed", fontsize=9, loc="right")
+    axes[-1].set_xlabel(xlabel)
+    for ax in axes:
+        label_ends(ax)
+    return figure, axes

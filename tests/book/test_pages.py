@@ -60,6 +60,13 @@ CONTRAST = """theme => {
         .map(e => [contrast(e), +getComputedStyle(e).fontWeight, e.textContent.slice(0, 50)]);
 }"""
 
+# Display formulas wider than the page, and inline ones that are cut and cannot be scrolled.
+WIDE = """[...document.querySelectorAll('div.math mjx-container')]
+    .filter(box => box.scrollWidth > box.clientWidth + 1).map(box => box.textContent)"""
+CUT = """[...document.querySelectorAll('span.math')].filter(box =>
+    box.querySelector('mjx-math')?.getBoundingClientRect().width > box.clientWidth + 1
+    && getComputedStyle(box).overflowX == 'hidden').map(box => box.textContent)"""
+
 
 # --- as files -----------------------------------------------------------------------------------
 
@@ -133,13 +140,14 @@ def test_the_page_loads_without_error_and_without_network(visit):
     assert visit.errors == []
 
 
-def test_every_formula_is_rendered(visit):
+def test_every_formula_is_rendered_and_fits(visit):
     written, rendered, failed = (
         visit.page.locator(selector).count()
         for selector in (".math", "mjx-container", "mjx-merror, [data-mjx-error]")
     )
     assert rendered >= written
     assert failed == 0
+    assert visit.page.evaluate(WIDE) == []
 
 
 def test_every_image_is_shown_and_described(visit):
@@ -157,6 +165,7 @@ def test_verdicts_and_captions_are_legible(visit, theme):
 
 
 @pytest.mark.parametrize("name", toc())
-def test_a_narrow_screen_needs_no_sideways_scrolling(browser, name):
+def test_a_narrow_screen_needs_no_sideways_scrolling_and_cuts_nothing(browser, name):
     with browser.visit(name, width=390) as visit:
         assert visit.page.evaluate("document.documentElement.scrollWidth") <= 390 + 1
+        assert visit.page.evaluate(CUT) == []
