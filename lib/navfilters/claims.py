@@ -26,6 +26,14 @@ ESTABLISHED = "established here"
 VERDICTS = (REPRODUCED, IN_SHAPE, UNDERDETERMINED, NOT_REPRODUCED, ESTABLISHED)
 KINDS = ("value", "bound", "order", "boolean")
 
+_NEAR = {"abs", "rel", "factor"}
+_SHAPE_KEYS = {
+    "value": _NEAR,
+    "bound": {"at_most", "at_least"},
+    "order": {"swaps"},
+    "boolean": {"holding"},
+}
+
 
 class ClaimError(AssertionError):
     """A fresh value that does not give the recorded verdict, or an entry that is not one."""
@@ -104,6 +112,18 @@ class Claim:
             )
         if self.kind == "value" and not own and self.reproduced_within is None:
             raise ClaimError(f"{self.id}: a claim of kind 'value' needs reproduced_within")
+        rules = [
+            ("reproduced_within", _NEAR),
+            ("tolerance", {"abs", "rel"}),
+            ("agreement", {"abs", "rel"}),
+            ("shape_rule", _SHAPE_KEYS[self.kind]),
+        ]
+        if self.kind == "bound" and not own:
+            rules.append(("paper_value", _SHAPE_KEYS["bound"]))
+        for name, known in rules:
+            rule = getattr(self, name)
+            if rule is not None and not (isinstance(rule, Mapping) and rule and set(rule) <= known):
+                raise ClaimError(f"{self.id}: {name} is a table of {sorted(known)}; found {rule!r}")
 
 
 def derive(claim: Claim, value: Any, *, second: Any = None) -> str:
@@ -170,6 +190,8 @@ def _order(claim: Claim, value: Mapping) -> str:
     if set(value) != set(names):
         raise ClaimError(f"{claim.id}: the order is of {names}; found values for {list(value)}")
     pairs = [(a, b) for i, a in enumerate(names) for b in names[i + 1 :]]
+    if any(math.isnan(x) for x in _numbers(value)):
+        return NOT_REPRODUCED
     swaps = sum(not value[a] < value[b] for a, b in pairs)
     if swaps == 0:
         return REPRODUCED
@@ -180,7 +202,7 @@ def _order(claim: Claim, value: Mapping) -> str:
 
 def _boolean(claim: Claim, value: Any) -> str:
     parts = list(value.values()) if isinstance(value, Mapping) else [value]
-    holding = sum(bool(part) == claim.paper_value for part in parts)
+    holding = sum(part == claim.paper_value for part in parts)
     if holding == len(parts):
         return REPRODUCED
     if claim.shape_rule and holding >= claim.shape_rule["holding"]:
@@ -212,13 +234,14 @@ def _near(value: Any, target: Any, rule: Mapping | None) -> bool:
 
 def _near_one(a: float, b: float, rule: Mapping) -> bool:
     if "factor" in rule:
-        return a * b > 0 and 1 / rule["factor"] <= a / b <= rule["factor"]
+        return b != 0 and 1 / rule["factor"] <= a / b <= rule["factor"]
     return abs(a - b) <= rule.get("abs", 0.0) + rule.get("rel", 0.0) * abs(b)
 
 
 def _within(value: Any, bound: Mapping) -> bool:
     low, high = bound.get("at_least", -math.inf), bound.get("at_most", math.inf)
-    return all(low <= x <= high for x in _numbers(value))
+    numbers = _numbers(value)
+    return bool(numbers) and all(low <= x <= high for x in numbers)
 
 
 def check(claim_id: str, value: Any, *, second: Any = None) -> None:
@@ -260,7 +283,7 @@ def _ordered_like(value: Any, recorded: Any) -> Any:
     if isinstance(value, Mapping) and isinstance(recorded, Mapping):
         if set(value) != set(recorded):
             return []
-        return {key: recorded[key] for key in value}
+        return {key: _ordered_like(value[key], recorded[key]) for key in value}
     return recorded
 
 

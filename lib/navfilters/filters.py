@@ -122,7 +122,7 @@ def bump_predicted(
 
 
 def bump_circular(prior: Gaussian, model: MeasurementModel, moments: Moments):
-    """R_new = R + |P| H H^T: as if the state were uncertain by its worst direction in all.
+    """R_new = R + norm(P) H H^T: as if the state were uncertain by its worst direction in all.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def bump_circular(prior: Gaussian, model: MeasurementModel, moments: Moments):
 
 
 def bump_equivalent(prior: Gaussian, model: MeasurementModel, moments: Moments):
-    """R_new = |J R J^T| H H^T with J = H^-1: every sensor as coarse, in state space, as the worst.
+    """R_new = norm(J R J^T) H H^T, J = H^-1: every sensor as coarse, in state space, as the worst.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def bump_equivalent(prior: Gaussian, model: MeasurementModel, moments: Moments):
 
 
 def bump_state(prior: Gaussian, model: MeasurementModel, moments: Moments):
-    """P_new = |P| I: forget every direction, keep the worst uncertainty.
+    """P_new = norm(P) I: forget every direction, keep the worst uncertainty.
 
     Parameters
     ----------

@@ -278,7 +278,8 @@ def sweep_panels(
 ) -> tuple[Any, Sequence[Axes]]:
     """The indicator I of ten filters over a sweep, one panel for each family, one axis for all.
 
-    Exact zeros are drawn at the floor; failed members as crosses on the upper edge, and counted there.
+    Exact zeros are drawn at the floor; failed members as crosses on the upper edge, and counted
+    there.
 
     Parameters
     ----------

@@ -8,12 +8,12 @@ from navfilters.types import Array
 
 @dataclass(frozen=True, eq=False)
 class RangeBearing:
-    """Distance and angle of a point x = (x1, x2), z = (|x|, atan2(x2, x1)) + v with v ~ N(0, R).
+    """Distance and angle of a point x = (x1, x2): z = (hypot(x1, x2), atan2(x2, x1)) + v.
 
     Parameters
     ----------
     R : array (..., 2, 2)
-        Noise covariance, symmetric positive definite: units squared, radians squared.
+        Covariance of the noise v, symmetric positive definite: units squared, radians squared.
 
     Raises
     ------
