@@ -20,6 +20,7 @@ def refresh(path: Path) -> str:
         timeout=300,
         kernel_name="python3",
         record_timing=False,
+        coalesce_streams=True,  # where a stream breaks is a matter of timing
         resources={"metadata": {"path": str(path.parent)}},
     )
     client.execute()
