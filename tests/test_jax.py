@@ -65,8 +65,11 @@ def test_one_member(name):
     assert_agree(got, FILTERS[name](one, z[0], model, **options_of(name)), one)
 
 
-@every_filter
-@pytest.mark.parametrize("make", [problem, problem_of_three, linear_problem])
+@pytest.mark.parametrize(
+    ("name", "make"),
+    [(name, make) for name in FILTERS for make in (problem, problem_of_three)]
+    + [("mtSOF", linear_problem), ("UKFz", linear_problem)],
+)
 def test_a_batch(name, make):
     """Two by two in closed form, three by three by elimination and eigenvalues, and h(x) = H x."""
     prior, z, model = make()
