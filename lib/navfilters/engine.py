@@ -75,18 +75,19 @@ def run(
         for k in range(steps):
             state = estimator(state, z[k] if z_varies else z, model)
             states.append(state)
-    mean_shape, cov_shape = states[-1].mean.shape, states[-1].cov.shape
+    n = prior.mean.shape[-1]
+    batch = np.broadcast_shapes(state.mean.shape[:-1], state.cov.shape[:-2])
     return Gaussian(
-        np.stack([np.broadcast_to(s.mean, mean_shape) for s in states]),
-        np.stack([np.broadcast_to(s.cov, cov_shape) for s in states]),
+        np.stack([np.broadcast_to(s.mean, (*batch, n)) for s in states]),
+        np.stack([np.broadcast_to(s.cov, (*batch, n, n)) for s in states]),
     )
 
 
 def _measurements(z, prior, model, steps, z_varies) -> np.ndarray:
     """z as an array whose shape fits the prior, the model and the number of steps."""
     axes = "steps, ..., m" if z_varies else "..., m"
-    z = validation.real_array("z", z, "steps, m" if z_varies else "m")
-    if z_varies and z.shape[0] != steps:
+    z = validation.real_array("z", z, "m")
+    if z_varies and (z.ndim < 2 or z.shape[0] != steps):
         raise ValueError(f"z must have shape ({axes}) with {steps} steps; found {z.shape}")
     m = np.shape(model.R)[-1]
     if z.shape[-1] != m:

@@ -7,7 +7,7 @@ import numpy as np
 from navfilters.types import Gaussian
 
 SYMMETRY = 1e-9
-"""Largest relative difference between a covariance and its transpose that is taken for rounding."""
+"""Largest difference of a covariance from its transpose, as a correlation, taken for rounding."""
 
 
 def real_array(name: str, value: Any, core: str) -> np.ndarray:
@@ -78,21 +78,22 @@ def covariance(name: str, value: Any, size: int | None = None, *, definite: bool
     if rows != columns or (size is not None and rows != size):
         wanted = "(..., n, n)" if size is None else f"(..., {size}, {size})"
         raise ValueError(f"{name} must have shape {wanted}; found {array.shape}")
-    scale = np.abs(array).max(axis=(-2, -1))
-    skew = np.abs(array - array.mT).max(axis=(-2, -1))
-    if (skew > SYMMETRY * scale).any():
-        raise ValueError(
-            f"{name} must be symmetric; found a difference of {skew.max():.3g} from its transpose"
-        )
-    array = (array + array.mT) / 2
     deviation = np.sqrt(np.abs(np.diagonal(array, axis1=-2, axis2=-1)))
     deviation = np.where(deviation > 0, deviation, 1.0)
-    correlation = array / (deviation[..., :, None] * deviation[..., None, :])
-    smallest = np.linalg.eigvalsh(correlation).min()  # scaled: units must not decide
+    correlation = array / deviation[..., :, None] / deviation[..., None, :]  # units must not decide
+    if np.max(np.abs(correlation - correlation.mT), initial=0.0) > SYMMETRY:
+        found = np.max(np.abs(array - array.mT))
+        raise ValueError(
+            f"{name} must be symmetric; found a difference of {found:.3g} from its transpose"
+        )
+    array = (array + array.mT) / 2
+    smallest = np.min(np.linalg.eigvalsh((correlation + correlation.mT) / 2), initial=np.inf)
     rounding = 8 * rows * np.finfo(float).eps
-    if smallest < (rounding if definite else -rounding):
+    still = np.diagonal(array, axis1=-2, axis2=-1) == 0
+    covaries = (still[..., None] & (array != 0)).any()  # of what does not vary
+    if covaries or smallest < (rounding if definite else -rounding):
         needed = "definite" if definite else "semidefinite"
-        found = np.linalg.eigvalsh(array).min()
+        found = np.min(np.linalg.eigvalsh(array))
         raise ValueError(
             f"{name} must be symmetric positive {needed}; found smallest eigenvalue {found:.3g}"
         )
