@@ -382,11 +382,11 @@ SHOWN = {
         "paper 10, ours 1.2346e-07",
         "1.2346&thinsp;×&thinsp;10<sup>-7",
     ),
-    "bound": (make("bound", ours=[1, 2.5]), "at_most 1, ours 1, 2.5", "paper ≤ 1 · ours 1, 2.5"),
+    "bound": (make("bound", ours=[1, 2.5]), "at_most: 1, ours 1, 2.5", "paper ≤ 1 · ours 1, 2.5"),
     "order": (
         make("order", ours={"a": 1, "b": 0}),
         "paper a, b, c",
-        "paper a, b, c · ours a 1; b 0",
+        "paper a, b, c · ours a: 1; b: 0",
     ),
     "boolean": (make("boolean", ours=False), "paper yes, ours no", "paper yes · ours no"),
     "finding": (finding(ours=3), "paper none, ours 3", 'numbers">ours 3<'),
@@ -408,7 +408,7 @@ def test_the_badge_shows_both_values_and_the_verdict(kind):
 def test_the_badge_escapes_what_it_shows():
     claim = make("order", statement="a < b & c", source="x, <i>", reason="<b>", ours={"<s>": 1})
     html = Badge(claim)._repr_html_()
-    for text in ("a &lt; b &amp; c", "x, &lt;i&gt;", "&lt;b&gt;", "&lt;s&gt; 1"):
+    for text in ("a &lt; b &amp; c", "x, &lt;i&gt;", "&lt;b&gt;", "&lt;s&gt;: 1"):
         assert text in html
     assert not any(tag in html for tag in ("<i>", "<b>", "<s>"))
 
@@ -422,8 +422,13 @@ def test_summary_and_scorecard_count_and_list(ledger):
         .replace("paper_value = 10", "")
         .replace('"reproduced"', '"established here"'),
     )
-    assert repr(claims.summary()) == "someone1999: [1, 0, 0, 0, 0]\nthis book: [0, 0, 0, 0, 1]"
-    assert claims.summary()._repr_html_().count("<tr>") == 3
+    lines = repr(claims.summary()).splitlines()
+    assert lines[0] == "reproduced: {'someone1999': 1, 'this book': 0}"
+    assert lines[4:] == [
+        "established here: {'someone1999': 0, 'this book': 1}",
+        "all: {'someone1999': 1, 'this book': 1}",
+    ]
+    assert claims.summary()._repr_html_().count("<tr") == 7
     page = claims.scorecard("someone1999")._repr_html_()
     assert '<a href="part/chapter.html#claim-ten">Fig. 1</a>' in page
     assert "claim-own" not in page

@@ -346,7 +346,7 @@ class Page:
 
 
 def summary() -> Page:
-    """Verdicts by source, counted: the one table that a hurried reader needs.
+    """Verdicts of each source, counted: the one table that a hurried reader needs.
 
     Returns
     -------
@@ -355,14 +355,15 @@ def summary() -> Page:
     ledger = load().values()
     sources = list(dict.fromkeys(_work(c) for c in ledger))
     counts = Counter((_work(c), c.verdict) for c in ledger)
-    head = "".join(f"<th>{v}</th>" for v in VERDICTS) + "<th>all</th>"
+    head = "".join(f"<th>{_text(source)}</th>" for source in sources)
     rows, lines = [], []
-    for source in sources:
-        numbers = [counts[source, v] for v in VERDICTS]
-        cells = "".join(f"<td>{n or '·'}</td>" for n in (*numbers, sum(numbers)))
-        rows.append(f"<tr><th>{_text(source)}</th>{cells}</tr>")
-        lines.append(f"{source}: {numbers}")
-    table = f'<table class="claims-summary"><tr><th>source</th>{head}</tr>{"".join(rows)}</table>'
+    for verdict in (*VERDICTS, "all"):
+        chosen = VERDICTS if verdict == "all" else (verdict,)
+        numbers = [sum(counts[source, v] for v in chosen) for source in sources]
+        cells = "".join(f"<td>{n or '·'}</td>" for n in numbers)
+        rows.append(f'<tr class="claim-{_slug(verdict)}"><th>{verdict}</th>{cells}</tr>')
+        lines.append(f"{verdict}: {dict(zip(sources, numbers, strict=True))}")
+    table = f'<table class="claims-summary"><tr><th>verdict</th>{head}</tr>{"".join(rows)}</table>'
     return Page(f'<div class="claims-scroll">{table}</div>', "\n".join(lines))
 
 
@@ -424,7 +425,7 @@ def _plain(value: Any) -> str:
     if value is None:
         return "none"
     if isinstance(value, Mapping):
-        return "; ".join(f"{key} {_plain(item)}" for key, item in value.items())
+        return "; ".join(f"{key}: {_plain(item)}" for key, item in value.items())
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, list | tuple):
@@ -437,9 +438,9 @@ def _plain(value: Any) -> str:
 
 
 def _rich(value: Any) -> str:
-    names = {"at_most": "≤", "at_least": "≥"}
+    names = {"at_most": "≤ ", "at_least": "≥ "}
     if isinstance(value, Mapping):
-        return "; ".join(f"{_text(names.get(k) or k)} {_rich(v)}" for k, v in value.items())
+        return "; ".join(f"{names.get(k) or _text(k) + ': '}{_rich(v)}" for k, v in value.items())
     if isinstance(value, int | float) and not isinstance(value, bool) and value:
         digits = f"{value:.5g}"
         if "e" in digits:
