@@ -76,6 +76,13 @@ def test_no_step_needs_no_measurement():
     assert_array_equal(cov, BASE.prior.cov[None])
 
 
+def test_no_step_has_the_batch_axes_all_the_same():
+    """The axes that only the measurement or the model has."""
+    z = BASE.z + np.zeros((5, 1))
+    assert history(z=z, steps=0).mean.shape == (1, 5, 2)
+    assert history(z=z, steps=0).cov.shape == (1, 5, 2, 2)
+
+
 @pytest.mark.parametrize("steps", [0, 2])
 def test_an_empty_batch_has_an_empty_history(steps):
     """A chunk of a sweep that holds no member is no error."""

@@ -487,3 +487,12 @@ def test_a_bump_leaves_more_uncertainty(name, problem):
     if np.linalg.eigvalsh(P_zz).min() > 1e-6 * norm(P_zz):
         more = FILTERS[name](*problem).cov - FILTERS[bare](*problem).cov
         assert np.linalg.eigvalsh(more).min() >= -1e-9 * norm(prior.cov)
+
+
+@pytest.mark.parametrize("name", ["B-EKF 1", "B-mtSOF", "B-UKF"])
+@pytest.mark.parametrize("bump", [-0.5, np.nan, np.array([1.0, -1.0])])
+def test_a_negative_bump_is_refused(name, bump):
+    prior = Gaussian(np.array([20.0, 80.0]), 100.0 * np.eye(2))
+    model = RangeBearing(np.diag([1.0, 0.01]))
+    with pytest.raises(ValueError, match=r"bump must be at least 0; found (-|nan)"):
+        FILTERS[name](prior, np.array([80.0, 1.0]), model, bump=bump)

@@ -89,3 +89,8 @@ def test_batch_is_the_common_shape_or_an_error_that_names_each():
     assert validation.batch(a=(3, 1), b=(4,), c=()) == (3, 4)
     with pytest.raises(ValueError, match=r"found a \(3,\), b \(4,\)"):
         validation.batch(a=(3,), b=(4,))
+
+
+def test_a_huge_covariance_is_no_overflow():
+    P = 1.5e308 * np.eye(2)
+    assert_array_equal(validation.covariance("P", P, definite=True), P)

@@ -69,22 +69,22 @@ def run(
     if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or steps < 0:
         raise ValueError(f"steps must be an integer of at least 0; found {steps!r}")
     prior = validation.gaussian("prior", prior)
-    z = _measurements(z, prior, model, int(steps), z_varies)
+    z, batch = _measurements(z, prior, model, int(steps), z_varies)
     state, states = prior, [prior]
     with np.errstate(all="ignore"):  # a member that fails is NaN in the result: that is its report
         for k in range(steps):
             state = estimator(state, z[k] if z_varies else z, model)
             states.append(state)
     n = prior.mean.shape[-1]
-    batch = np.broadcast_shapes(state.mean.shape[:-1], state.cov.shape[:-2])
+    batch = np.broadcast_shapes(batch, state.mean.shape[:-1], state.cov.shape[:-2])
     return Gaussian(
         np.stack([np.broadcast_to(s.mean, (*batch, n)) for s in states]),
         np.stack([np.broadcast_to(s.cov, (*batch, n, n)) for s in states]),
     )
 
 
-def _measurements(z, prior, model, steps, z_varies) -> np.ndarray:
-    """z as an array whose shape fits the prior, the model and the number of steps."""
+def _measurements(z, prior, model, steps, z_varies) -> tuple[np.ndarray, tuple[int, ...]]:
+    """z as an array that fits the prior, the model and the number of steps; and the batch axes."""
     axes = "steps, ..., m" if z_varies else "..., m"
     z = validation.real_array("z", z, "m")
     if z_varies and (z.ndim < 2 or z.shape[0] != steps):
@@ -105,7 +105,7 @@ def _measurements(z, prior, model, steps, z_varies) -> np.ndarray:
             f"prior.mean must have shape (..., {H.shape[-1]}) for this model; found "
             f"{prior.mean.shape}"
         )
-    validation.batch(
+    batch = validation.batch(
         **{
             "prior.mean": prior.mean.shape[:-1],
             "prior.cov": prior.cov.shape[:-2],
@@ -114,7 +114,7 @@ def _measurements(z, prior, model, steps, z_varies) -> np.ndarray:
             "model.jacobian": H.shape[:-2],
         }
     )
-    return z
+    return z, batch
 
 
 def first_indefinite(cov: Array) -> np.ndarray:

@@ -87,6 +87,11 @@ def bump_linear(prior: Gaussian, model: MeasurementModel, moments: Moments, *, b
     -------
     tuple of Gaussian, Moments
 
+    Raises
+    ------
+    ValueError
+        A negative or NaN bump.
+
     References
     ----------
     perea2007, Eqs. (13), (14) and, for the second-order filter, section V.A.
@@ -112,6 +117,11 @@ def bump_predicted(
     Returns
     -------
     tuple of Gaussian, Moments
+
+    Raises
+    ------
+    ValueError
+        A negative or NaN bump.
 
     References
     ----------
@@ -232,6 +242,8 @@ def _add_noise(moments: Moments, extra: Array) -> Moments:
 
 
 def _per_member(like: Array, value: Array) -> Array:
+    if isinstance(value, int | float | np.ndarray) and not np.all(np.asarray(value) >= 0):
+        raise ValueError(f"bump must be at least 0; found {np.min(value)}")
     return like.__array_namespace__().asarray(value)[..., None, None]
 
 

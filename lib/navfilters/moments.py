@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from navfilters import linalg
+from navfilters import linalg, validation
 from navfilters.types import Array, Gaussian, MeasurementModel, Moments
 
 
@@ -113,7 +113,7 @@ class SigmaPoints:
     Raises
     ------
     ValueError
-        An unknown root; alpha, beta or kappa not finite; alpha, or n + kappa, not positive.
+        An unknown root; alpha, beta or kappa not finite numbers; alpha not positive.
 
     References
     ----------
@@ -129,10 +129,9 @@ class SigmaPoints:
         if self.root not in ROOTS:
             raise ValueError(f"root must be one of {sorted(ROOTS)}; found {self.root!r}")
         for name in ("alpha", "beta") if self.kappa is None else ("alpha", "beta", "kappa"):
-            value = np.asarray(getattr(self, name), float)
-            if not np.isfinite(value).all() or (name == "alpha" and (value <= 0).any()):
-                needed = "positive" if name == "alpha" else "finite"
-                raise ValueError(f"{name} must be {needed}; found {value}")
+            value = validation.real_array(name, getattr(self, name), "")
+            if name == "alpha" and (value <= 0).any():
+                raise ValueError(f"alpha must be positive; found {value.min()}")
 
     def weights(self, n: int) -> tuple[Array, Array, Array, Array]:
         """Scaling and weights for a state of size n.

@@ -20,7 +20,7 @@ def real_array(name: str, value: Any, core: str) -> np.ndarray:
     value : array-like
         What was given.
     core : str
-        The trailing axes, such as "n, n".
+        The trailing axes, such as "n, n"; "" for none.
 
     Returns
     -------
@@ -31,7 +31,9 @@ def real_array(name: str, value: Any, core: str) -> np.ndarray:
     ValueError
         Not real numbers, too few axes, a core of size zero, or values that are not finite.
     """
-    needed = f"{name} must be an array (..., {core}) of finite real numbers"
+    axes = len(core.split(", ")) if core else 0
+    shape = f"(..., {core})" if core else "(...)"
+    needed = f"{name} must be an array {shape} of finite real numbers"
     try:
         array = np.asarray(value)
     except ValueError as error:
@@ -39,7 +41,6 @@ def real_array(name: str, value: Any, core: str) -> np.ndarray:
     if array.dtype.kind not in "iuf":
         raise ValueError(f"{needed}; found dtype {array.dtype}")
     array = array.astype(np.float64, copy=False)
-    axes = core.count(",") + 1
     if array.ndim < axes or 0 in array.shape[array.ndim - axes :]:
         raise ValueError(f"{needed}; found shape {array.shape}")
     bad = ~np.isfinite(array)
@@ -86,7 +87,7 @@ def covariance(name: str, value: Any, size: int | None = None, *, definite: bool
         raise ValueError(
             f"{name} must be symmetric; found a difference of {found:.3g} from its transpose"
         )
-    array = (array + array.mT) / 2
+    array = array / 2 + array.mT / 2
     smallest = np.min(np.linalg.eigvalsh((correlation + correlation.mT) / 2), initial=np.inf)
     rounding = 8 * rows * np.finfo(float).eps
     still = np.diagonal(array, axis1=-2, axis2=-1) == 0
