@@ -1,4 +1,4 @@
-"""Execute every notebook in place: outputs refreshed, nothing stored that a second run would change."""
+"""Execute every notebook in place, and store nothing that a second run would change."""
 
 import sys
 from concurrent.futures import ThreadPoolExecutor
