@@ -62,6 +62,8 @@ class Claim:
     paper_value : number, list, bool or table, optional
         What the source gives: a number or numbers; at_most and at_least for a bound; names, best
         first, for an order. None for a finding of the book's own.
+    our_reading : bool
+        Whether paper_value is our reading of a word such as "similar", and not a printed number.
     reproduced_within : table, optional
         abs, rel or factor: how near a value must come, from the printed digits.
     shape_rule : table, optional
@@ -94,6 +96,7 @@ class Claim:
     tolerance: Mapping | None = None
     agreement: Mapping | None = None
     reason: str = ""
+    our_reading: bool = False
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -309,13 +312,15 @@ class Badge:
 
     def __repr__(self) -> str:
         c = self.claim
-        return f"[{c.verdict}] {c.id}: paper {_plain(c.paper_value)}, ours {_plain(c.ours)}"
+        word = "read as" if c.our_reading else "paper"
+        return f"[{c.verdict}] {c.id}: {word} {_plain(c.paper_value)}, ours {_plain(c.ours)}"
 
     def _repr_html_(self) -> str:
         c = self.claim
         numbers = f"ours {_rich(c.ours)}"
         if c.paper_value is not None:
-            numbers = f"paper {_rich(c.paper_value)} · {numbers}"
+            word = "read as" if c.our_reading else "paper"
+            numbers = f"{word} {_rich(c.paper_value)} · {numbers}"
         reason = f'<div class="claim-reason">{_text(c.reason)}</div>' if c.reason else ""
         return (
             f'<div class="claim claim-{_slug(c.verdict)}" id="claim-{c.id}">'
@@ -394,6 +399,8 @@ def scorecard(work: str) -> Page:
         where = f'<a href="{c.chapter}.html#claim-{c.id}">{_text(_place(c))}</a>'
         reason = f'<div class="claim-reason">{_text(c.reason)}</div>' if c.reason else ""
         paper = "" if c.paper_value is None else _rich(c.paper_value)
+        if c.our_reading:
+            paper = f'<span class="claim-reason">read as</span> {paper}'
         rows.append(
             f"<tr><td>{_text(c.statement)} {where}{reason}</td><td>{paper}</td>"
             f'<td>{_rich(c.ours)}</td><td class="claim-{_slug(c.verdict)}">'
