@@ -8,7 +8,7 @@ SOURCES := $(shell find book lib -type f -not -path '*/__pycache__/*' -not -name
 	_config.yml _toc.yml requirements.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help book test unit lint notebooks nbval pages screens lock clean
+.PHONY: help book test unit coverage lint notebooks nbval pages screens lock clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1  /p' $(MAKEFILE_LIST) | awk '{printf "  make %-10s", $$1; $$1 = ""; print}'
@@ -21,9 +21,12 @@ $(BUILT): $(SOURCES) $(VENV)/.book
 	$(BIN)/jupyter-book build . --warningiserror --nitpick --keep-going
 	@touch $@
 
-test: lint unit nbval pages  ## everything: lint, types, unit tests, notebooks, rendered pages
+test: lint coverage nbval pages  ## everything: lint, types, unit tests, notebooks, rendered pages
 
-unit: $(VENV)/.test  ## unit and property tests with branch coverage
+unit: $(VENV)/.test  ## unit and property tests alone, under a minute
+	$(BIN)/pytest tests --ignore tests/book -n 2
+
+coverage: $(VENV)/.test  ## the same with branch coverage
 	$(BIN)/pytest tests --ignore tests/book -n 2 --cov --cov-report=term
 
 lint: $(VENV)/.test  ## ruff over code and notebooks, mypy over the library
