@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 EKF, SECOND_ORDER, UKF, MEASUREMENT = "#D55E00", "#009E73", "#0072B2", "#E69F00"
+ROBUST = "#CC79A7"
 TRUTH, BOUND = "black", "0.55"
 
 _DASHES: dict[str, Any] = {
@@ -33,6 +34,9 @@ _VARIANTS = {
     "UKF": (UKF, "plain", "o"),
     "B-UKF": (UKF, "dashed", "s"),
     "UKFz": (UKF, "dash-dot-dot", "P"),
+    "REKF": (ROBUST, "plain", "o"),
+    "AEKF": (ROBUST, "dashed", "s"),
+    "AREKF": (ROBUST, "dash-dot-dot", "P"),
 }
 STYLES: dict[str, dict[str, Any]] = {
     name: {"color": color, "linestyle": _DASHES[dash], "marker": marker}

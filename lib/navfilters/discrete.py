@@ -1,0 +1,245 @@
+"""The discrete-time extended Kalman filter, with noise that need not be additive.
+
+    posterior --predict--> prior --update--> posterior
+
+The update is :func:`~navfilters.filters.kalman_update`, the one of every other filter here.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from navfilters import validation
+from navfilters.derivatives import check_model, jacobian, probe
+from navfilters.filters import kalman_update
+from navfilters.types import Array, Gaussian, Moments
+
+
+@dataclass(frozen=True)
+class DiscreteSystem:
+    """x_k = f(x_{k-1}, u_{k-1}, w_{k-1}, k-1),   y_k = h(x_k, v_k, k),   w ~ N(0, Q),   v ~ N(0, R)
+
+    Parameters
+    ----------
+    f : callable
+        (x, u, w, k) -> (..., n): from step k to step k + 1, with x (..., n), u (..., m), w (w,).
+    h : callable
+        (x, v, k) -> (..., p): the measurement at step k, with v (v,).
+    Q : array (w, w)
+        Covariance of the process noise, in w's units squared.
+    R : array (v, v)
+        Covariance of the measurement noise, in v's units squared.
+    F, L : callable, optional
+        (x, u, w, k) -> (..., n, n) and (..., n, w): the Jacobians of f in x and w.
+    H, M : callable, optional
+        (x, v, k) -> (..., p, n) and (..., p, v): the Jacobians of h in x and v. Those not given are
+        computed by :func:`~navfilters.derivatives.complex_step`.
+
+    Raises
+    ------
+    TypeError
+        A function that cannot be called.
+    ValueError
+        Q or R is not a covariance.
+
+    References
+    ----------
+    lecture16, Eqs. (38)-(41), (73)-(78).
+    """
+
+    f: Callable[..., Array]
+    h: Callable[..., Array]
+    Q: Array
+    R: Array
+    F: Callable[..., Array] | None = None
+    L: Callable[..., Array] | None = None
+    H: Callable[..., Array] | None = None
+    M: Callable[..., Array] | None = None
+
+    def __post_init__(self) -> None:
+        check_model(self, ("f", "h"), ("F", "L", "H", "M"))
+
+    def motion_jacobians(self, x: Array, u: Array, k: int) -> tuple[Array, Array]:
+        """F (..., n, n) and L (..., n, w) at the state x, with w = 0: Eqs. (81)-(82).
+
+        Parameters
+        ----------
+        x : array (..., n)
+        u : array (..., m)
+        k : int
+            The step that f starts from.
+
+        Returns
+        -------
+        tuple of array
+        """
+        at = x, u, np.zeros(len(self.Q)), k
+        F = jacobian(self.f, 0, self.F, name="system.f")
+        L = jacobian(self.f, 2, self.L, name="system.f")
+        return F(*at), L(*at)
+
+    def measurement_jacobians(self, x: Array, k: int) -> tuple[Array, Array]:
+        """H (..., p, n) and M (..., p, v) at the state x, with v = 0: Eqs. (85)-(86).
+
+        Parameters
+        ----------
+        x : array (..., n)
+        k : int
+            The step of the measurement.
+
+        Returns
+        -------
+        tuple of array
+        """
+        at = x, np.zeros(len(self.R)), k
+        H = jacobian(self.h, 0, self.H, name="system.h")
+        M = jacobian(self.h, 1, self.M, name="system.h")
+        return H(*at), M(*at)
+
+
+def predict(system: DiscreteSystem, posterior: Gaussian, u: Array, k: int) -> Gaussian:
+    """The motion update, from step k to step k + 1.
+
+    x_{k+1|k} = f(x_{k|k}, u_k, 0, k),   P_{k+1|k} = F P_{k|k} F^T + L Q L^T
+
+    Parameters
+    ----------
+    system : DiscreteSystem
+    posterior : Gaussian
+        mean (..., n), cov (..., n, n), after the measurement of step k.
+    u : array (..., m)
+        The known input over the step; of size 0 where there is none.
+    k : int
+        The step it starts from.
+
+    Returns
+    -------
+    Gaussian
+        The prior of step k + 1.
+
+    References
+    ----------
+    lecture16, Eqs. (81)-(84), whose index k is k + 1 here; L_k in (49) and (58) is the L_{k-1} of
+    (84).
+    """
+    F, L = system.motion_jacobians(posterior.mean, u, k)
+    P = F @ posterior.cov @ F.mT + L @ system.Q @ L.mT
+    return Gaussian(system.f(posterior.mean, u, np.zeros(len(system.Q)), k), (P + P.mT) / 2)
+
+
+def update(system: DiscreteSystem, prior: Gaussian, y: Array, k: int) -> Gaussian:
+    """The measurement update at step k.
+
+    y_hat = h(x, 0, k),   S = H P H^T + M R M^T,   K = P H^T S^-1,
+    x+ = x + K (y - y_hat),   P+ = (I - K H) P
+
+    Parameters
+    ----------
+    system : DiscreteSystem
+    prior : Gaussian
+        mean (..., n), cov (..., n, n), before the measurement of step k.
+    y : array (..., p)
+        The measurement.
+    k : int
+        The step.
+
+    Returns
+    -------
+    Gaussian
+        The posterior of step k. Not finite where S is singular.
+
+    References
+    ----------
+    lecture16, Eqs. (85)-(91). (66) carries a noise term that its own expectation removes; (68) and
+    (87) have the estimate x_hat where they print x.
+    """
+    H, M = system.measurement_jacobians(prior.mean, k)
+    P_xz = prior.cov @ H.mT
+    S = H @ P_xz + M @ system.R @ M.mT
+    y_hat = system.h(prior.mean, np.zeros(len(system.R)), k)
+    return kalman_update(prior, y, Moments(y_hat, S, P_xz))
+
+
+def extended_kalman_filter(
+    system: DiscreteSystem, prior: Gaussian, y: Any, u: Any = None
+) -> Gaussian:
+    """The discrete-time extended Kalman filter over K measurements.
+
+    Parameters
+    ----------
+    system : DiscreteSystem
+    prior : Gaussian
+        mean (..., n), cov (..., n, n): the estimate at step 0, before any measurement.
+    y : array-like (K, ..., p)
+        The measurements of steps 1 to K.
+    u : array-like (K, ..., m), optional
+        The inputs of steps 0 to K - 1. By default none: f sees an array of size 0.
+
+    Returns
+    -------
+    Gaussian
+        mean (K + 1, ..., n), cov (K + 1, ..., n, n): the prior, then each posterior. NaN from the
+        step that cannot be computed.
+
+    Raises
+    ------
+    ValueError
+        A wrong shape, a value that is not finite, a covariance that is not one; before any step.
+    TypeError
+        system is not a DiscreteSystem, or one of its functions has neither a Jacobian nor a
+        derivative by complex step.
+
+    References
+    ----------
+    lecture16, the algorithm of Eqs. (73)-(91).
+    """
+    if not isinstance(system, DiscreteSystem):
+        raise TypeError(f"system must be a DiscreteSystem; found {type(system).__name__}")
+    prior = validation.gaussian("prior", prior)
+    y = _per_step("y", y, "K, p")
+    u = np.zeros((len(y), 0)) if u is None else _per_step("u", u, "K, m")
+    if len(u) != len(y):
+        raise ValueError(f"u must have one input per measurement, {len(y)}; found {len(u)}")
+    prior = _check(system, prior, y, u)
+    state, states = prior, [prior]
+    with np.errstate(all="ignore"):  # a member that fails is NaN in the result: that is its report
+        for k in range(len(y)):
+            state = update(system, predict(system, state, u[k], k), y[k], k + 1)
+            states.append(state)
+    return Gaussian(np.stack([s.mean for s in states]), np.stack([s.cov for s in states]))
+
+
+def _per_step(name: str, value: Any, axes: str) -> np.ndarray:
+    """An array whose first axis is the step."""
+    array = validation.real_array(name, value, "")
+    if array.ndim < 2 or 0 in array.shape:
+        wanted = ", ..., ".join(axes.split(", "))
+        raise ValueError(f"{name} must have shape ({wanted}); found {array.shape}")
+    return array
+
+
+def _check(system: DiscreteSystem, prior: Gaussian, y: np.ndarray, u: np.ndarray) -> Gaussian:
+    """Every function of the system, called once; the prior, with all the batch axes."""
+    batch = validation.batch(
+        **{
+            "prior.mean": prior.mean.shape[:-1],
+            "prior.cov": prior.cov.shape[:-2],
+            "y": y.shape[1:-1],
+            "u": u.shape[1:-1],
+        }
+    )
+    n, w, v, p = prior.mean.shape[-1], len(system.Q), len(system.R), y.shape[-1]
+    prior = Gaussian(
+        np.broadcast_to(prior.mean, (*batch, n)), np.broadcast_to(prior.cov, (*batch, n, n))
+    )
+    at = prior.mean, u[0], np.zeros(w), 0
+    probe("system.f", system.f, at, (n,))
+    probe("system.F", jacobian(system.f, 0, system.F, name="system.f"), at, (n, n))
+    probe("system.L", jacobian(system.f, 2, system.L, name="system.f"), at, (n, w))
+    sensing = prior.mean, np.zeros(v), 1
+    probe("system.h", system.h, sensing, (p,))
+    probe("system.H", jacobian(system.h, 0, system.H, name="system.h"), sensing, (p, n))
+    probe("system.M", jacobian(system.h, 1, system.M, name="system.h"), sensing, (p, v))
+    return prior

@@ -1,0 +1,462 @@
+"""Motion about an oblate Earth, with or without a thruster, and how uncertainty follows it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from navfilters import validation
+from navfilters.types import Array
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """A central body and its oblateness.
+
+    Parameters
+    ----------
+    mu : float
+        Gravitational constant, m^3/s^2.
+    radius : float
+        Equatorial radius R_e, m.
+    J2 : float
+        Second zonal coefficient; 0 leaves two bodies.
+
+    Raises
+    ------
+    ValueError
+        mu or radius not positive, or anything not finite.
+
+    References
+    ----------
+    xiong2009, Eq. (36); the text gives no values, these are WGS-84's.
+    """
+
+    mu: float = 3.986004418e14
+    radius: float = 6378137.0
+    J2: float = 1.08262668e-3
+
+    def __post_init__(self) -> None:
+        for name in ("mu", "radius", "J2"):
+            value = validation.real_array(name, getattr(self, name), "")
+            if value.ndim or (name != "J2" and value <= 0):
+                needed = "a number" if name == "J2" else "a positive number"
+                raise ValueError(f"{name} must be {needed}; found {getattr(self, name)}")
+
+    def potential(self, r: Array) -> Array:
+        """mu/r (1 - J2/2 (R_e/r)^2 (3 z^2/r^2 - 1)), whose gradient is the acceleration.
+
+        Parameters
+        ----------
+        r : array (..., 3)
+            Inertial position, m; the third axis is the body's.
+
+        Returns
+        -------
+        array (...)
+            m^2/s^2.
+        """
+        xp = r.__array_namespace__()
+        s = 1 / xp.linalg.vecdot(r, r)
+        z = r[..., 2]
+        return self.mu * xp.sqrt(s) * (1 - self._k * s * (z * z * s - 1 / 3))
+
+    def acceleration(self, r: Array) -> Array:
+        """-mu/r^3 (r (1 + k (1 - 5 z^2/r^2)) + 2 k z e_z),   k = 3/2 J2 (R_e/r)^2.
+
+        Parameters
+        ----------
+        r : array (..., 3)
+            Inertial position, m.
+
+        Returns
+        -------
+        array (..., 3)
+            m/s^2. Not finite at the centre.
+
+        References
+        ----------
+        xiong2009, Eq. (36), rows 4 to 6.
+        """
+        xp = r.__array_namespace__()
+        z = r[..., 2:]
+        s = 1 / xp.linalg.vecdot(r, r)[..., None]
+        k = self._k * s
+        along = r * (1 + k * (1 - (5 * s) * (z * z)))
+        return (-self.mu * s * xp.sqrt(s)) * (along + (2 * k * z) * xp.asarray(AXIS))
+
+    def gradient(self, r: Array) -> Array:
+        """Derivative of the acceleration with respect to position: the gravity gradient.
+
+        Parameters
+        ----------
+        r : array (..., 3)
+            Inertial position, m.
+
+        Returns
+        -------
+        array (..., 3, 3)
+            s^-2, symmetric and, the potential being harmonic, without trace.
+
+        References
+        ----------
+        xiong2009, the F of Eq. (4) for Eq. (36).
+        """
+        xp = r.__array_namespace__()
+        s = (1 / xp.linalg.vecdot(r, r))[..., None]
+        u = r * xp.sqrt(s)  # unit vector
+        c = u[..., 2:]
+        size, k = self.mu * s * xp.sqrt(s), self._k * s
+        n = xp.asarray(AXIS)
+        of_u = (size * (3 + k * (5 - 35 * c * c))) * u
+        of_n = (size * k) * (10 * c * u - n)
+        of_I = (size * (k * (5 * c * c - 1) - 1))[..., None]
+        G = of_u[..., :, None] * u[..., None, :] + of_I * xp.eye(3)
+        along_n = of_n[..., :, None] * n
+        return G + (along_n + along_n.mT)
+
+    @property
+    def _k(self) -> float:
+        return 1.5 * self.J2 * self.radius**2
+
+
+AXIS = np.array([0.0, 0.0, 1.0])
+EARTH = Gravity()
+
+
+@dataclass(frozen=True)
+class Thrust:
+    """A thruster that pushes along the inertial velocity, with one strength, in given arcs.
+
+    Parameters
+    ----------
+    magnitude : float
+        Acceleration, m/s^2, at least 0.
+    arcs : tuple of (float, float)
+        First and last second of each arc, in order of time.
+
+    Raises
+    ------
+    ValueError
+        A negative magnitude; arcs that are empty, overlap or are not in order.
+    """
+
+    magnitude: float
+    arcs: tuple[tuple[float, float], ...]
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.magnitude) and self.magnitude >= 0):
+            raise ValueError(f"magnitude must be at least 0; found {self.magnitude}")
+        times = np.array(self.arcs, float).reshape(-1)
+        if 2 * len(self.arcs) != times.size or not (np.diff(times) >= 0).all():
+            raise ValueError(f"arcs must be (start, end) pairs in order of time; found {self.arcs}")
+
+    def strength(self, t: float) -> float:
+        """Acceleration at time t, m/s^2: the magnitude from an arc's start to before its end.
+
+        Parameters
+        ----------
+        t : float
+            Seconds.
+
+        Returns
+        -------
+        float
+        """
+        return self.magnitude if any(start <= t < end for start, end in self.arcs) else 0.0
+
+
+COASTING = Thrust(0.0, ())
+
+
+@dataclass(frozen=True, eq=False)
+class Interval:
+    """One sampling interval of an orbit, linearised about the estimate it starts from.
+
+    Made by :meth:`Orbit.interval`; it is the dynamics that a filter asks for in one step.
+
+    Parameters
+    ----------
+    orbit : Orbit
+    start : array (..., 6)
+        State at the start: position, m, and velocity, m/s.
+    t : float
+        Time of the start, s.
+    path : array (substeps, ..., 6)
+        State after each sub-step.
+    F : array (..., 6, 6)
+        Derivative of the last state with respect to the first.
+    to_end : list of array (..., 6, 6)
+        Derivative of the last state with respect to that after each sub-step.
+    """
+
+    orbit: "Orbit"
+    start: Array
+    t: float
+    path: Array
+    F: Array
+    to_end: list[Array]
+
+    @property
+    def Q(self) -> Array:
+        """Covariance of the noise of *one sub-step*, (..., 6, 6): see ``accumulate``."""
+        return self.orbit.Q
+
+    def transition(self, x: Array) -> tuple[Array, Array]:
+        """The state at the interval's end, and its derivative with respect to x.
+
+        Parameters
+        ----------
+        x : array (..., 6)
+            State at the start. Another object than ``start`` is propagated anew.
+
+        Returns
+        -------
+        tuple of array (..., 6), array (..., 6, 6)
+            f(x) and F.
+
+        References
+        ----------
+        xiong2009, Eqs. (3)-(4).
+        """
+        if x is not self.start:
+            return self.orbit.interval(x, self.t).transition(x)
+        return self.path[-1], self.F
+
+    def accumulate(self, Q: Array, x: Array) -> Array:
+        """Covariance at the interval's end of a noise that enters after every sub-step.
+
+        sum_k Phi_k Q Phi_k^T,   Phi_k = d x(end) / d x(after sub-step k):
+        exactly what repeating P <- F P F^T + Q sub-step by sub-step adds to F P F^T.
+
+        Parameters
+        ----------
+        Q : array (..., 6, 6)
+            Covariance of each sub-step's noise: m^2, m^2/s, m^2/s^2.
+        x : array (..., 6)
+            As in ``transition``.
+
+        Returns
+        -------
+        array (..., 6, 6)
+
+        References
+        ----------
+        xiong2009, Eqs. (4) and (41).
+        """
+        if x is not self.start:
+            return self.orbit.interval(x, self.t).accumulate(Q, x)
+        return sum(Phi @ Q @ Phi.mT for Phi in self.to_end)
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """Motion of a spacecraft, x = (r, v), in sub-steps of a sampling interval.
+
+    Parameters
+    ----------
+    gravity : Gravity
+    thrust : Thrust
+        What the model knows of the thruster; by default nothing.
+    Q : array (..., 6, 6), optional
+        Covariance of the noise of *one sub-step*, symmetric positive semidefinite: m^2, m^2/s,
+        m^2/s^2. None by default.
+    step : float
+        Length of a sub-step, s. Thrust is constant within it, so its arcs should begin and end
+        with one.
+    substeps : int
+        Sub-steps of an interval between two measurements.
+    integrator : {"rk4", "euler"}
+        The classical Runge-Kutta step, with the exponential of the midpoint's Jacobian to third
+        order for F; or the step that the paper prints.
+
+    Raises
+    ------
+    ValueError
+        Naming the argument, the value found and what is needed.
+
+    Notes
+    -----
+    At one second Runge-Kutta is exact to micrometres per interval. The printed Euler step is off by
+    424 m and 0.47 m/s after 100 s in a low orbit, far more than the filter's noise admits.
+
+    References
+    ----------
+    xiong2009, Eqs. (34)-(36); the text does not give the sub-step.
+    """
+
+    gravity: Gravity = EARTH
+    thrust: Thrust = COASTING
+    Q: Array = None
+    step: float = 1.0
+    substeps: int = 100
+    integrator: Literal["rk4", "euler"] = "rk4"
+
+    def __post_init__(self) -> None:
+        if self.integrator not in INTEGRATORS:
+            known = sorted(INTEGRATORS)
+            raise ValueError(f"integrator must be one of {known}; found {self.integrator!r}")
+        if not (np.isfinite(self.step) and self.step > 0):
+            raise ValueError(f"step must be a positive number of seconds; found {self.step}")
+        substeps = self.substeps
+        if isinstance(substeps, bool) or not isinstance(substeps, int | np.integer) or substeps < 1:
+            raise ValueError(f"substeps must be an integer of at least 1; found {substeps!r}")
+        Q = np.zeros((6, 6)) if self.Q is None else self.Q
+        object.__setattr__(self, "Q", validation.covariance("Q", Q, 6, definite=False))
+
+    def derivative(self, x: Array, thrust: float = 0.0) -> Array:
+        """dx/dt: velocity, and gravity with a thrust along the velocity.
+
+        Parameters
+        ----------
+        x : array (..., 6)
+            Position, m, and velocity, m/s.
+        thrust : float
+            Acceleration of the thruster, m/s^2.
+
+        Returns
+        -------
+        array (..., 6)
+
+        References
+        ----------
+        xiong2009, Eq. (36).
+        """
+        xp = x.__array_namespace__()
+        v = x[..., 3:]
+        a = self.gravity.acceleration(x[..., :3])
+        if thrust:
+            a = a + v * (thrust / xp.sqrt(xp.linalg.vecdot(v, v)))[..., None]
+        return xp.concat([v, a], axis=-1)
+
+    def jacobian(self, x: Array, thrust: Array | None = None) -> Array:
+        """A = d(dx/dt)/dx.
+
+        Parameters
+        ----------
+        x : array (..., 6)
+            Position, m, and velocity, m/s.
+        thrust : array (...), optional
+            Acceleration of the thruster, m/s^2.
+
+        Returns
+        -------
+        array (..., 6, 6)
+            s^-2 by position and s^-1 by velocity in the last three rows.
+        """
+        xp = x.__array_namespace__()
+        E_r, E_v = xp.asarray(POSITION), xp.asarray(VELOCITY)
+        of_x = self.gravity.gradient(x[..., :3]) @ E_r
+        if thrust is not None:
+            v = x[..., 3:]
+            speed = xp.sqrt(xp.linalg.vecdot(v, v))
+            u = v / speed[..., None]
+            across = xp.eye(3) - u[..., :, None] * u[..., None, :]
+            of_x = of_x + (xp.asarray(thrust) / speed)[..., None, None] * (across @ E_v)
+        return E_r.mT @ E_v + E_v.mT @ of_x
+
+    def interval(self, x: Array, t: float = 0.0) -> Interval:
+        """Propagate a state over one sampling interval, and linearise about its path.
+
+        Parameters
+        ----------
+        x : array (..., 6)
+            Position, m, and velocity, m/s, at the interval's start.
+        t : float
+            Time of the start, s, for the thrust.
+
+        Returns
+        -------
+        Interval
+        """
+        xp = x.__array_namespace__()
+        advance = INTEGRATORS[self.integrator]
+        path = [x]
+        for thrust in self._thrusts(t, self.substeps):
+            path.append(advance(self.derivative, path[-1], thrust, self.step))
+        states = xp.stack(path)
+        to_end = [xp.zeros_like(x)[..., None] + xp.eye(6)]
+        size = max(1, CACHED // max(1, x[..., 0].size))
+        for first in reversed(range(0, self.substeps, size)):
+            steps = self.transitions(states[first : first + size + 1], t + first * self.step)
+            for k in reversed(range(steps.shape[0])):
+                to_end.append(to_end[-1] @ steps[k])
+        F = to_end.pop()
+        return Interval(self, x, t, states[1:], F, to_end[::-1])
+
+    def transitions(self, path: Array, t: float = 0.0) -> Array:
+        """Derivative of each state of a path with respect to the one a sub-step before.
+
+        Parameters
+        ----------
+        path : array (k + 1, ..., 6)
+            States one sub-step apart.
+        t : float
+            Time of the first, s, for the thrust.
+
+        Returns
+        -------
+        array (k, ..., 6, 6)
+        """
+        xp = path.__array_namespace__()
+        thrusts = self._thrusts(t, path.shape[0] - 1)
+        thrust = None
+        if any(thrusts):
+            thrust = xp.reshape(xp.asarray(thrusts), (-1, *(1,) * (path.ndim - 2)))
+        h, x, x_next = self.step, path[:-1], path[1:]
+        if self.integrator == "euler":
+            return xp.eye(6) + h * self.jacobian(x, thrust)
+        middle = (x + x_next) / 2
+        bend = (x[..., 3:] - x_next[..., 3:]) * (h / 8)  # of the cubic through both velocities
+        middle = xp.concat([middle[..., :3] + bend, middle[..., 3:]], axis=-1)
+        hA = h * self.jacobian(middle, thrust)
+        return xp.eye(6) + hA @ (xp.eye(6) + hA @ (xp.eye(6) / 2 + hA / 6))
+
+    def _thrusts(self, t: float, count: int) -> list[float]:
+        """Strength in the middle of each of so many sub-steps."""
+        return [self.thrust.strength(t + self.step * (k + 0.5)) for k in range(count)]
+
+
+POSITION, VELOCITY = np.eye(6)[:3], np.eye(6)[3:]  # r = POSITION @ x; constants, not concat: faster
+CACHED = 2000
+"""Matrices worked on at a time: enough to amortise a call, few enough for the cache."""
+
+
+def _euler(derivative, x: Array, thrust: float, h: float) -> Array:
+    return x + h * derivative(x, thrust)  # Eq. (35)
+
+
+def _rk4(derivative, x: Array, thrust: float, h: float) -> Array:
+    k1 = derivative(x, thrust)
+    k2 = derivative(x + (h / 2) * k1, thrust)
+    k3 = derivative(x + (h / 2) * k2, thrust)
+    k4 = derivative(x + h * k3, thrust)
+    return x + (h / 6) * (k1 + 2 * (k2 + k3) + k4)
+
+
+INTEGRATORS = {"rk4": _rk4, "euler": _euler}
+
+
+def perigee_apogee(x: Array, gravity: Gravity = EARTH) -> tuple[Array, Array]:
+    """Heights of the osculating ellipse's perigee and apogee above the equatorial radius.
+
+    Parameters
+    ----------
+    x : array (..., 6)
+        Position, m, and velocity, m/s.
+    gravity : Gravity
+        Gives mu and the radius; J2 takes no part.
+
+    Returns
+    -------
+    tuple of array (...)
+        Metres.
+    """
+    xp = x.__array_namespace__()
+    r, v = x[..., :3], x[..., 3:]
+    distance = xp.sqrt(xp.linalg.vecdot(r, r))
+    v2, rv = xp.linalg.vecdot(v, v), xp.linalg.vecdot(r, v)
+    a = 1 / (2 / distance - v2 / gravity.mu)
+    ev = (v2 / gravity.mu - 1 / distance)[..., None] * r - (rv / gravity.mu)[..., None] * v
+    e = xp.sqrt(xp.linalg.vecdot(ev, ev))
+    return a * (1 - e) - gravity.radius, a * (1 + e) - gravity.radius

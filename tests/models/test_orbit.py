@@ -1,0 +1,302 @@
+"""Gravity, thrust and an interval of flight: against JAX, differences and naive loops."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.integrate import solve_ivp
+
+from navfilters.models import orbit
+from navfilters.models.orbit import EARTH, Gravity, Orbit, Thrust, perigee_apogee
+
+jax.config.update("jax_enable_x64", True)
+
+MU, RE, J2 = 3.986004418e14, 6378137.0, 1.08262668e-3
+SCALE = np.array([1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3])  # m and m/s of similar weight in an orbit
+BURN = Thrust(0.45, ((30, 70),))
+Q = np.diag([4e-4, 4e-4, 4e-4, 4e-8, 1e-8, 9e-8])
+
+
+def low_orbit():
+    i, speed = np.deg2rad(27.0), np.sqrt(MU / 6878137.0)
+    return np.array([6878137.0, 0, 0, 0, speed * np.cos(i), speed * np.sin(i)])
+
+
+def states(count=6):
+    """Around orbits of 500 to 2700 km, in every direction."""
+    rng = np.random.default_rng(0)
+    r = rng.normal(size=(count, 3))
+    r *= rng.uniform(6.9e6, 9.1e6, (count, 1)) / np.linalg.norm(r, axis=1, keepdims=True)
+    v = np.cross(r, rng.normal(size=(count, 3)))
+    v *= rng.uniform(6.5e3, 7.8e3, (count, 1)) / np.linalg.norm(v, axis=1, keepdims=True)
+    return np.concatenate([r, v], axis=1)
+
+
+def by_jax(function, x):
+    return np.asarray(jax.jit(jax.vmap(jax.jacfwd(function)))(x))
+
+
+def assert_close(got, wanted, relative):
+    assert_allclose(got, wanted, rtol=0, atol=relative * np.abs(wanted).max())
+
+
+def test_acceleration_is_equation_36_row_by_row():
+    for x, y, z in states()[:, :3]:
+        r = np.sqrt(x * x + y * y + z * z)
+        k, tilt = 1.5 * J2 * (RE / r) ** 2, 5 * z * z / r**2
+        wanted = [
+            -MU * x / r**3 * (1 + k * (1 - tilt)),
+            -MU * y / r**3 * (1 + k * (1 - tilt)),
+            -MU * z / r**3 * (1 + k * (3 - tilt)),
+        ]
+        assert_allclose(EARTH.acceleration(np.array([x, y, z])), wanted, rtol=1e-14)
+
+
+def test_acceleration_is_the_gradient_of_the_potential():
+    """By JAX to rounding, and by differences with a step of 10 m."""
+    r = states()[:, :3]
+    assert_close(EARTH.acceleration(r), by_jax(EARTH.potential, r), 1e-14)
+    step = 10 * np.eye(3)[:, None]
+    difference = (EARTH.potential(r + step) - EARTH.potential(r - step)) / 20
+    assert_close(np.moveaxis(difference, 0, -1), EARTH.acceleration(r), 1e-9)
+
+
+def test_potential_has_the_second_zonal_harmonic():
+    """mu/r (1 - J2 (Re/r)^2 P2(sin latitude)), P2(s) = (3 s^2 - 1) / 2."""
+    for r in states()[:, :3]:
+        d = np.linalg.norm(r)
+        legendre = (3 * (r[2] / d) ** 2 - 1) / 2
+        assert_allclose(
+            EARTH.potential(r), MU / d * (1 - J2 * (RE / d) ** 2 * legendre), rtol=1e-15
+        )
+
+
+def test_gravity_gradient():
+    r = states()[:, :3]
+    G = EARTH.gradient(r)
+    assert_close(G, by_jax(EARTH.acceleration, r), 1e-14)
+    step = 10 * np.eye(3)[:, None]
+    difference = (EARTH.acceleration(r + step) - EARTH.acceleration(r - step)) / 20
+    assert_close(np.moveaxis(difference, 0, -1), G, 1e-9)
+    assert_allclose(G, G.mT, rtol=1e-14)
+    assert_allclose(np.trace(G, axis1=-2, axis2=-1), 0, atol=1e-21)
+
+
+def test_without_oblateness_there_are_two_bodies():
+    sphere, r = Gravity(J2=0.0), states()[:, :3]
+    d = np.linalg.norm(r, axis=1, keepdims=True)
+    assert_allclose(sphere.acceleration(r), -MU * r / d**3, rtol=1e-14)
+
+
+@pytest.mark.parametrize("thrust", [0.0, 0.45])
+def test_jacobian_of_the_motion(thrust):
+    x, dynamics = states(), Orbit()
+    A = dynamics.jacobian(x, thrust=np.full(len(x), thrust) if thrust else None)
+    wanted = by_jax(lambda x: dynamics.derivative(x, thrust), x)
+    for rows in (slice(3), slice(3, 6)):
+        for columns in (slice(3), slice(3, 6)):
+            got, block = A[:, rows, columns], wanted[:, rows, columns]
+            assert_allclose(got, block, rtol=0, atol=1e-14 * np.abs(block).max())
+
+
+def test_thrust_is_along_the_velocity():
+    x, dynamics = states(), Orbit()
+    pushed = dynamics.derivative(x, 0.45) - dynamics.derivative(x)
+    v = x[:, 3:]
+    assert_array_equal(pushed[:, :3], 0)
+    along = 0.45 * v / np.linalg.norm(v, axis=1, keepdims=True)
+    assert_allclose(pushed[:, 3:], along, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("integrator", "relative"), [("rk4", 1e-7), ("euler", 1e-10)], ids=lambda v: str(v)
+)
+@pytest.mark.parametrize("thrust", [orbit.COASTING, BURN], ids=["coasting", "burn"])
+def test_transition_is_the_derivative_of_the_interval(integrator, relative, thrust):
+    """Differences of fourth order are good to 1e-10 themselves; Euler's F is exact."""
+    x, dynamics = states(), Orbit(thrust=thrust, integrator=integrator)
+    end, F = dynamics.interval(x).transition(x)
+    assert end.shape == (6, 6)
+    steps = (np.eye(6) * 1e3 * SCALE)[:, None]
+    at = {k: dynamics.interval(x + k * steps).path[-1] for k in (-2, -1, 1, 2)}
+    difference = (8 * (at[1] - at[-1]) - (at[2] - at[-2])) / 12 / 1e3
+    wanted = np.moveaxis(difference, 0, -1)  # columns already per SCALE
+    assert_close(F * SCALE / SCALE[:, None], wanted / SCALE[:, None], relative)
+
+
+def test_transition_tends_to_the_exact_one_with_order_two():
+    x = states()
+    F = [Orbit(step=h, substeps=round(400 / h)).interval(x).F for h in (40, 20, 10, 1)]
+    error = [np.abs((f - F[-1]) * SCALE / SCALE[:, None]).max() for f in F[:-1]]
+    assert_allclose(np.log2(error[0] / error[1]), 2, atol=0.15)
+    assert_allclose(np.log2(error[1] / error[2]), 2, atol=0.15)
+
+
+@pytest.mark.parametrize("thrust", [0.0, 0.45])
+def test_runge_kutta_is_exact_to_micrometres(thrust):
+    dynamics = Orbit(thrust=Thrust(thrust, ((0, 100),)))
+    flight = solve_ivp(
+        lambda _, x: dynamics.derivative(x, thrust),
+        (0, 100),
+        low_orbit(),
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-10,
+    )
+    error = dynamics.interval(low_orbit()).path[-1] - flight.y[:, -1]
+    assert np.abs(error[:3]).max() < 1e-6
+    assert np.abs(error[3:]).max() < 1e-9
+
+
+def test_the_printed_euler_step_errs_by_hundreds_of_metres():
+    """Eq. (35): 424 m and 0.47 m/s in 100 s."""
+    x = low_orbit()
+    error = Orbit(integrator="euler").interval(x).path[-1] - Orbit().interval(x).path[-1]
+    assert_allclose(np.linalg.norm(error[:3]), 424, atol=1)
+    assert_allclose(np.linalg.norm(error[3:]), 0.47, atol=0.005)
+
+
+def test_runge_kutta_keeps_energy_and_momentum():
+    """Both integrals of the oblate problem, over 2000 s."""
+    path = Orbit(substeps=2000).interval(states()).path
+    r, v = path[..., :3], path[..., 3:]
+    energy = np.sum(v * v, axis=-1) / 2 - EARTH.potential(r)
+    momentum = r[..., 0] * v[..., 1] - r[..., 1] * v[..., 0]
+    for integral in (energy, momentum):
+        assert_allclose(integral, np.broadcast_to(integral[0], integral.shape), rtol=1e-12)
+
+
+@pytest.mark.parametrize("integrator", ["rk4", "euler"])
+@pytest.mark.parametrize("thrust", [orbit.COASTING, BURN], ids=["coasting", "burn"])
+def test_noise_accumulates_as_step_by_step(integrator, thrust):
+    """P <- F P F^T + Q over each sub-step is F P F^T + accumulate(Q) over the interval."""
+    whole = Orbit(thrust=thrust, Q=Q, integrator=integrator)
+    each = replace(whole, substeps=1)
+    start = x = states()
+    P0 = P = np.diag([25e6] * 3 + [100.0] * 3)
+    for k in range(100):
+        second = each.interval(x, float(k))
+        x, F = second.transition(x)
+        P = F @ P @ F.mT + second.accumulate(second.Q, second.start)
+    interval = whole.interval(start)
+    end, F = interval.transition(start)
+    assert_array_equal(end, x)
+    assert_array_equal(interval.Q, Q)
+    assert_close(F @ P0 @ F.mT + interval.accumulate(interval.Q, start), P, 1e-13)
+    without = interval.accumulate(Q, start)
+    assert_close(without, without.mT, 1e-14)
+
+
+def test_noise_may_be_a_batch():
+    x = states(4)
+    many = Q * np.array([1.0, 4.0, 9.0])[:, None, None, None]
+    interval = Orbit(Q=many).interval(x)
+    got = interval.accumulate(interval.Q, x)
+    assert got.shape == (3, 4, 6, 6)
+    assert_allclose(got[2, 1], 9 * Orbit().interval(x[1]).accumulate(Q, x[1]), rtol=1e-9)
+
+
+def test_another_state_is_propagated_anew():
+    x = states()
+    interval = Orbit(thrust=BURN).interval(x, 25.0)
+    other = x + 1.0
+    fresh = Orbit(thrust=BURN).interval(other, 25.0)
+    for got, wanted in zip(interval.transition(other), fresh.transition(other), strict=True):
+        assert_array_equal(got, wanted)
+    assert_array_equal(interval.accumulate(Q, other), fresh.accumulate(Q, other))
+
+
+@pytest.mark.parametrize("batch", [(), (1,), (5,), (2, 3), (0,)])
+def test_batch_axes_come_first_and_members_do_not_meet(batch):
+    x = np.resize(states(), (*batch, 6))
+    interval = Orbit(thrust=BURN, Q=Q).interval(x)
+    assert interval.path.shape == (100, *batch, 6)
+    assert interval.F.shape == (*batch, 6, 6)
+    for i in np.ndindex(batch):
+        one = Orbit(thrust=BURN, Q=Q).interval(x[i])
+        assert_array_equal(interval.path[(slice(None), *i)], one.path)
+        assert_array_equal(interval.F[i], one.F)
+        assert_array_equal(interval.accumulate(Q, x)[i], one.accumulate(Q, x[i]))
+
+
+@pytest.mark.parametrize("cached", [1, 13, 10**6])
+def test_the_size_of_the_cache_changes_nothing(monkeypatch, cached):
+    wanted = Orbit(thrust=BURN).interval(states())
+    monkeypatch.setattr(orbit, "CACHED", cached)
+    assert_array_equal(Orbit(thrust=BURN).interval(states()).F, wanted.F)
+
+
+def test_a_member_that_fails_stays_alone():
+    x = states()
+    x[2] = np.nan
+    got, wanted = Orbit().interval(x), Orbit().interval(states())
+    others = [0, 1, 3, 4, 5]
+    assert np.isnan(got.F[2]).any()
+    assert_array_equal(got.F[others], wanted.F[others])
+
+
+def test_the_same_source_compiles_under_jax():
+    dynamics, x = Orbit(thrust=Thrust(0.45, ((1, 3),)), Q=Q, substeps=4), states()
+
+    @jax.jit
+    def step(x):
+        interval = dynamics.interval(x)
+        return *interval.transition(x), interval.accumulate(interval.Q, x)
+
+    interval = dynamics.interval(x)
+    wanted = (*interval.transition(x), interval.accumulate(Q, x))
+    for got, ours in zip(step(jnp.asarray(x)), wanted, strict=True):
+        assert_close(np.asarray(got), ours, 1e-13)
+
+
+def test_arcs_of_thrust():
+    thrust = Thrust(0.5, ((10, 20), (30, 40)))
+    times = [0, 10, 19.9, 20, 29, 30, 39.5, 40]
+    assert [thrust.strength(t) for t in times] == [0, 0.5, 0.5, 0, 0, 0.5, 0.5, 0]
+    assert orbit.COASTING.strength(0.0) == 0
+
+
+def test_thrust_acts_in_its_sub_steps_only():
+    x = low_orbit()
+    burn, coast = (Orbit(thrust=t).interval(x).path for t in (BURN, orbit.COASTING))
+    assert_array_equal(burn[:30], coast[:30])
+    assert (burn[30] != coast[30]).any()
+    gained = np.linalg.norm(burn[69, 3:]) - np.linalg.norm(coast[69, 3:])
+    assert_allclose(gained, 40 * 0.45, rtol=0.01)
+    late = Orbit(thrust=BURN).interval(x, 70.0).path
+    assert_array_equal(late, coast)
+
+
+def test_perigee_and_apogee():
+    assert_allclose(perigee_apogee(low_orbit()), [500e3, 500e3], atol=1e-6)
+    low, high = 6.9e6, 9.2e6
+    speed = np.sqrt(MU * (2 / low - 2 / (low + high)))
+    x = np.array([[0, low, 0, 0, 0, speed], [0, -high, 0, speed * low / high, 0, 0]])
+    assert_allclose(perigee_apogee(x)[0], low - RE, atol=1e-6)
+    assert_allclose(perigee_apogee(x)[1], high - RE, atol=1e-6)
+
+
+REFUSED = {
+    "mu": (lambda: Gravity(mu=0.0), "mu must be a positive number; found 0"),
+    "radius": (lambda: Gravity(radius=-1.0), "radius must be a positive number; found -1"),
+    "J2": (lambda: Gravity(J2=np.nan), "J2 must be .*found nan"),
+    "magnitude": (lambda: Thrust(-0.1, ()), "magnitude must be at least 0; found -0.1"),
+    "NaN thrust": (lambda: Thrust(np.nan, ()), "magnitude must be at least 0; found nan"),
+    "reversed": (lambda: Thrust(1.0, ((20, 10),)), "arcs must be .*in order.*found"),
+    "overlapping": (lambda: Thrust(1.0, ((0, 10), (5, 20))), "arcs must be .*in order.*found"),
+    "integrator": (lambda: Orbit(integrator="rk5"), r"one of \['euler', 'rk4'\]; found 'rk5'"),
+    "step": (lambda: Orbit(step=0.0), "step must be a positive number of seconds; found 0"),
+    "substeps": (lambda: Orbit(substeps=0), "substeps must be an integer .*found 0"),
+    "substeps: half": (lambda: Orbit(substeps=1.5), "substeps must be an integer .*found 1.5"),
+    "Q: size": (lambda: Orbit(Q=np.eye(3)), r"Q must have shape .*6, 6.*found \(3, 3\)"),
+    "Q: indefinite": (lambda: Orbit(Q=-np.eye(6)), "Q must be symmetric positive semi.*found"),
+}
+
+
+@pytest.mark.parametrize(("make", "message"), REFUSED.values(), ids=REFUSED)
+def test_bad_input_is_refused_by_name(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
