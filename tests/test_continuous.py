@@ -444,6 +444,15 @@ def test_bad_reference(reference, error, message):
         linearized_kalman_bucy(LINEAR, reference, PRIOR, y, TIMES, u)
 
 
+def test_only_the_lkf_needs_the_inputs_jacobian():
+    wrong = replace(LINEAR, B=lambda *a: A)
+    with pytest.raises(
+        ValueError, match=r"system.B must return .*\(\.\.\., 3, 2\).*found \(3, 3\)"
+    ):
+        lkf(system=wrong)
+    assert_array_equal(ekf(wrong).mean, ekf().mean)
+
+
 def test_a_gain_that_vanishes_on_the_way_is_reported_with_its_time():
     system = replace(LINEAR, M=lambda x, v, t: M * (t < 2))
     with pytest.raises(

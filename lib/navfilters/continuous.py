@@ -19,7 +19,7 @@ from navfilters.types import Array, Gaussian
 Signal = Callable[[float], Array]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ContinuousSystem:
     """dx/dt = f(x, u, w, t),   y = h(x, v, t),   w ~ N(0, Q),   v ~ N(0, R), both white
 
@@ -104,7 +104,7 @@ class Reference:
     v: Signal | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trajectory:
     """What a continuous filter knew at each time.
 
@@ -194,6 +194,9 @@ def linearized_kalman_bucy(
     x_ref, u_ref, w_ref, v_ref = _signals(system, reference, t[0], prior.mean.size)
     u = u_ref if u is None else _signal("u", u, t[0], u_ref(t[0]).size)
     _probe(system, x_ref(t[0]), u(t[0]), w_ref(t[0]), v_ref(t[0]), t[0], y0.size)
+    at = x_ref(t[0]), u_ref(t[0]), w_ref(t[0]), t[0]
+    if at[1].size:
+        probe("system.B", system.jacobian("B"), at, (at[0].size, at[1].size))
     _check_reference(system, reference, t, residual_tol)
     A, B, L, C, M = (system.jacobian(name) for name in "ABLCM")
 

@@ -17,7 +17,7 @@ from navfilters.filters import kalman_update
 from navfilters.types import Array, Gaussian, Moments
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DiscreteSystem:
     """x_k = f(x_{k-1}, u_{k-1}, w_{k-1}, k-1),   y_k = h(x_k, v_k, k),   w ~ N(0, Q),   v ~ N(0, R)
 
