@@ -222,7 +222,7 @@ def test_tqdm_is_used_where_it_is_installed(monkeypatch):
             return list(updates)
 
     monkeypatch.setitem(sys.modules, "tqdm", Tqdm)
-    assert xiong2009._progress(range(3)) == [0, 1, 2]
+    assert xiong2009.progress_bar(range(3)) == [0, 1, 2]
 
 
 def test_the_module_runs_as_a_command():

@@ -1,7 +1,6 @@
 """Xiong, Zhang and Liu (2009): navigation by stars and the Earth, through unknown burns."""
 
 import argparse
-import importlib
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,6 +12,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from navfilters._progress import progress as progress_bar
 from navfilters.linalg import right_divide
 from navfilters.models.orbit import COASTING, EARTH, Gravity, Orbit, Thrust, perigee_apogee
 from navfilters.models.star_earth_sensor import StarEarthSensor
@@ -533,22 +533,6 @@ def table(variant: str = "A", seeds: Sequence[int] = range(20), **options: Any) 
     return "\n".join(lines)
 
 
-def _progress(updates: Iterable) -> Iterable:
-    """tqdm's bar where it is installed, a counter otherwise; both on stderr."""
-    try:
-        bar = importlib.import_module("tqdm").tqdm
-    except ImportError:
-        return _counted(list(updates))
-    return bar(updates, leave=False)
-
-
-def _counted(updates: list) -> Iterable:
-    for i, update in enumerate(updates, start=1):
-        sys.stderr.write(f"\r{i}/{len(updates)}" if i < len(updates) else "\r\033[K")
-        sys.stderr.flush()
-        yield update
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print Table 1: ``python -m navfilters.experiments.xiong2009 --variant B --seeds 20``.
 
@@ -563,7 +547,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     chosen = parser.parse_args(arguments)
     if chosen.seeds < 1:
         parser.error(f"--seeds must be at least 1; found {chosen.seeds}")
-    text = table(chosen.variant, range(chosen.seeds), progress=_progress)
+    text = table(chosen.variant, range(chosen.seeds), progress=progress_bar)
     sys.stdout.write(f"variant {chosen.variant}, {chosen.seeds} seeds\n{text}\n")
 
 

@@ -1,127 +1,16 @@
 """Motion about an oblate Earth, with or without a thruster, and how uncertainty follows it."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
 from navfilters import validation
+from navfilters.models.earth_fixed import EarthFixedOrbit as EarthFixedOrbit
+from navfilters.models.earth_fixed import runge_kutta
+from navfilters.models.gravity import EARTH, Gravity
 from navfilters.types import Array
-
-
-@dataclass(frozen=True)
-class Gravity:
-    """A central body and its oblateness.
-
-    Parameters
-    ----------
-    mu : float
-        Gravitational constant, m^3/s^2.
-    radius : float
-        Equatorial radius R_e, m.
-    J2 : float
-        Second zonal coefficient; 0 leaves two bodies.
-
-    Raises
-    ------
-    ValueError
-        mu or radius not positive, or anything not finite.
-
-    References
-    ----------
-    xiong2009, Eq. (36); the text gives no values, these are WGS-84's.
-    """
-
-    mu: float = 3.986004418e14
-    radius: float = 6378137.0
-    J2: float = 1.08262668e-3
-
-    def __post_init__(self) -> None:
-        for name in ("mu", "radius", "J2"):
-            value = validation.real_array(name, getattr(self, name), "")
-            if value.ndim or (name != "J2" and value <= 0):
-                needed = "a number" if name == "J2" else "a positive number"
-                raise ValueError(f"{name} must be {needed}; found {getattr(self, name)}")
-
-    def potential(self, r: Array) -> Array:
-        """mu/r (1 - J2/2 (R_e/r)^2 (3 z^2/r^2 - 1)), whose gradient is the acceleration.
-
-        Parameters
-        ----------
-        r : array (..., 3)
-            Inertial position, m; the third axis is the body's.
-
-        Returns
-        -------
-        array (...)
-            m^2/s^2.
-        """
-        xp = r.__array_namespace__()
-        s = 1 / xp.linalg.vecdot(r, r)
-        z = r[..., 2]
-        return self.mu * xp.sqrt(s) * (1 - self._k * s * (z * z * s - 1 / 3))
-
-    def acceleration(self, r: Array) -> Array:
-        """-mu/r^3 (r (1 + k (1 - 5 z^2/r^2)) + 2 k z e_z),   k = 3/2 J2 (R_e/r)^2.
-
-        Parameters
-        ----------
-        r : array (..., 3)
-            Inertial position, m.
-
-        Returns
-        -------
-        array (..., 3)
-            m/s^2. Not finite at the centre.
-
-        References
-        ----------
-        xiong2009, Eq. (36), rows 4 to 6.
-        """
-        xp = r.__array_namespace__()
-        z = r[..., 2:]
-        s = 1 / xp.linalg.vecdot(r, r)[..., None]
-        k = self._k * s
-        along = r * (1 + k * (1 - (5 * s) * (z * z)))
-        return (-self.mu * s * xp.sqrt(s)) * (along + (2 * k * z) * xp.asarray(AXIS))
-
-    def gradient(self, r: Array) -> Array:
-        """Derivative of the acceleration with respect to position: the gravity gradient.
-
-        Parameters
-        ----------
-        r : array (..., 3)
-            Inertial position, m.
-
-        Returns
-        -------
-        array (..., 3, 3)
-            s^-2, symmetric and, the potential being harmonic, without trace.
-
-        References
-        ----------
-        xiong2009, the F of Eq. (4) for Eq. (36).
-        """
-        xp = r.__array_namespace__()
-        s = (1 / xp.linalg.vecdot(r, r))[..., None]
-        u = r * xp.sqrt(s)  # unit vector
-        c = u[..., 2:]
-        size, k = self.mu * s * xp.sqrt(s), self._k * s
-        n = xp.asarray(AXIS)
-        of_u = (size * (3 + k * (5 - 35 * c * c))) * u
-        of_n = (size * k) * (10 * c * u - n)
-        of_I = (size * (k * (5 * c * c - 1) - 1))[..., None]
-        G = of_u[..., :, None] * u[..., None, :] + of_I * xp.eye(3)
-        along_n = of_n[..., :, None] * n
-        return G + (along_n + along_n.mT)
-
-    @property
-    def _k(self) -> float:
-        return 1.5 * self.J2 * self.radius**2
-
-
-AXIS = np.array([0.0, 0.0, 1.0])
-EARTH = Gravity()
 
 
 @dataclass(frozen=True)
@@ -373,7 +262,7 @@ class Orbit:
         advance = INTEGRATORS[self.integrator]
         path = [x]
         for thrust in self._thrusts(t, self.substeps):
-            path.append(advance(self.derivative, path[-1], thrust, self.step))
+            path.append(advance(partial(self.derivative, thrust=thrust), path[-1], self.step))
         states = xp.stack(path)
         to_end = [xp.zeros_like(x)[..., None] + xp.eye(6)]
         size = max(1, CACHED // max(1, x[..., 0].size))
@@ -422,19 +311,11 @@ CACHED = 2000
 """Matrices worked on at a time: enough to amortise a call, few enough for the cache."""
 
 
-def _euler(derivative, x: Array, thrust: float, h: float) -> Array:
-    return x + h * derivative(x, thrust)  # Eq. (35)
+def _euler(derivative, x: Array, h: float) -> Array:
+    return x + h * derivative(x)  # Eq. (35)
 
 
-def _rk4(derivative, x: Array, thrust: float, h: float) -> Array:
-    k1 = derivative(x, thrust)
-    k2 = derivative(x + (h / 2) * k1, thrust)
-    k3 = derivative(x + (h / 2) * k2, thrust)
-    k4 = derivative(x + h * k3, thrust)
-    return x + (h / 6) * (k1 + 2 * (k2 + k3) + k4)
-
-
-INTEGRATORS = {"rk4": _rk4, "euler": _euler}
+INTEGRATORS = {"rk4": runge_kutta, "euler": _euler}
 
 
 def perigee_apogee(x: Array, gravity: Gravity = EARTH) -> tuple[Array, Array]:
