@@ -102,3 +102,28 @@ def test_panels_are_a_flat_list():
     figure, axes = plotting.panels(2, 3)
     assert len(axes) == 6
     plt.close(figure)
+
+
+def test_coastlines_of_a_window():
+    """Galveston stands on the coast, and every coast has a point on each side that it must."""
+    coasts = plotting.coastlines(-98, -92, 27, 31)
+    to_galveston = np.concatenate(coasts) - [-94.79, 29.30]
+    assert np.hypot(*to_galveston.T).min() < 0.2
+    for coast in coasts:
+        (left, bottom), (right, top) = coast.min(axis=0), coast.max(axis=0)
+        assert left <= -92
+        assert right >= -98
+        assert bottom <= 31
+        assert top >= 27
+    assert plotting.coastlines(-40, -35, 30, 35) == []  # the open Atlantic
+
+
+def test_arrows_of_a_diagram_run_level_or_upright_from_edge_to_edge(ax):
+    boxes = {"a": (0, 0), "b": (3, 0), "c": (3, 2)}
+    arrows = [("a", "b", "go", "-", 0.0), ("b", "a", "back", "-", 0.1), ("c", "b", "", "--", 0.2)]
+    plotting.block_diagram(ax, boxes, arrows, inputs=["a"])
+    assert [p.get_facecolor() for p in ax.patches][0] != ax.patches[1].get_facecolor()
+    spans = [(t.xyann, t.xy) for t in ax.texts if getattr(t, "arrow_patch", None)]
+    wanted = [((0.55, 0), (2.45, 0)), ((2.45, -0.1), (0.55, -0.1)), ((3.2, 1.68), (3.2, 0.32))]
+    assert_allclose(spans, wanted, atol=1e-12)
+    assert {"a", "b", "c", "go", "back"} <= {t.get_text() for t in ax.texts}

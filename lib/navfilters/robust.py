@@ -297,7 +297,7 @@ class AdaptiveEKF:
     a: Array = 1.5
     k: int = 2
     N: int = 15
-    directions: Array = field(default_factory=_paper_directions)
+    directions: Array = field(default_factory=_paper_directions, metadata={"axes": 2})
     current: bool = False
 
     def __post_init__(self) -> None:
