@@ -122,7 +122,7 @@ def test_arrows_of_a_diagram_run_level_or_upright_from_edge_to_edge(ax):
     boxes = {"a": (0, 0), "b": (3, 0), "c": (3, 2)}
     arrows = [("a", "b", "go", "-", 0.0), ("b", "a", "back", "-", 0.1), ("c", "b", "", "--", 0.2)]
     plotting.block_diagram(ax, boxes, arrows, inputs=["a"])
-    assert [p.get_facecolor() for p in ax.patches][0] != ax.patches[1].get_facecolor()
+    assert ax.patches[0].get_facecolor() != ax.patches[1].get_facecolor()
     spans = [(t.xyann, t.xy) for t in ax.texts if getattr(t, "arrow_patch", None)]
     wanted = [((0.55, 0), (2.45, 0)), ((2.45, -0.1), (0.55, -0.1)), ((3.2, 1.68), (3.2, 0.32))]
     assert_allclose(spans, wanted, atol=1e-12)

@@ -96,7 +96,7 @@ def smallest_lambda(P: Array, Sigma_bar: Array) -> Array:
 def attenuation_ratio(error: Array, *disturbances: Array) -> Array:
     """Energy of the errors over that of the disturbances, which the REKF keeps below gamma^2.
 
-    sum |x_t - x_hat_t|^2 / (sum |w_t|^2 + sum |Delta_t|^2 + sum |v_t|^2)
+    sum norm(x_t - x_hat_t)^2 / (sum norm(w_t)^2 + sum norm(Delta_t)^2 + sum norm(v_t)^2)
 
     Parameters
     ----------
@@ -135,18 +135,18 @@ def lemma_bound(
     *,
     as_printed: bool = False,
 ) -> np.ndarray:
-    """Bound on E|xi_t|^2 when E[V_t | xi_{t-1}] <= (1 - lambda) V_{t-1} + mu.
+    """Bound on E norm(xi_t)^2 when E[V_t | xi_{t-1}] <= (1 - lambda) V_{t-1} + mu.
 
-    (v_max / v_min) E|xi_0|^2 (1 - lambda)^t + (mu / v_min) sum of (1 - lambda)^i, i = 0 ... t - 1
+    (v_max / v_min) E norm(xi_0)^2 (1 - lambda)^t + (mu / v_min) sum of (1 - lambda)^i, i < t
 
     Parameters
     ----------
     v_min, v_max : float
-        v_min |xi|^2 <= V(xi) <= v_max |xi|^2.
+        v_min norm(xi)^2 <= V(xi) <= v_max norm(xi)^2.
     mu, lam : float
         The constants of Eq. (11), 0 <= lam <= 1. At lam = 0 the bound grows with t for ever.
     start : float
-        E|xi_0|^2.
+        E norm(xi_0)^2.
     t : int array (...)
         Times, at least 0.
     as_printed : bool
@@ -281,15 +281,16 @@ def theorem_constants(a: Assumptions, *, as_printed: bool = False) -> tuple[floa
 def theorem_bound(
     a: Assumptions, start: float, t: Array, *, as_printed: bool = False
 ) -> np.ndarray:
-    """Bound of Theorem 1 on the mean-square error E|x_t - x_hat_t|^2.
+    """Bound of Theorem 1 on the mean-square error E norm(x_t - x_hat_t)^2.
 
-    (p_max / p_min) E|x_0 - x_hat_0|^2 (1 - lambda_min)^t + mu_max p_max sum of (1 - lambda_min)^i
+    (p_max / p_min) e_0^2 (1 - lambda_min)^t + mu_max p_max sum of (1 - lambda_min)^i,
+    e_0^2 = E norm(x_0 - x_hat_0)^2
 
     Parameters
     ----------
     a : Assumptions
     start : float
-        E|x_0 - x_hat_0|^2.
+        E norm(x_0 - x_hat_0)^2.
     t : int array (...)
         Times, at least 0.
     as_printed : bool

@@ -1,6 +1,6 @@
 """Kalman-Bucy filters of nonlinear systems: about a reference trajectory, and about the estimate.
 
-Mean and covariance are integrated together by :func:`scipy.integrate.solve_ivp`; of the covariance
+Mean and covariance are integrated together by ``scipy.integrate.solve_ivp``; of the covariance
 only the upper triangle, so that it cannot become asymmetric.
 """
 
@@ -162,7 +162,7 @@ def linearized_kalman_bucy(
         Tolerances of the integrator. atol is in units of the prior's deviations (1 in the unit of a
         component that has none), products of them for the covariance.
     method : str
-        Of :func:`scipy.integrate.solve_ivp`; "LSODA" or "Radau" where P decays much faster than the
+        Of ``scipy.integrate.solve_ivp``; "LSODA" or "Radau" where P decays much faster than the
         state moves.
     residual_tol : float
         Largest :func:`reference_residual` allowed, as a fraction of the rates' scale.

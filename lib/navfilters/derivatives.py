@@ -150,7 +150,7 @@ def probe(name: str, function: Callable, arguments: tuple, core: tuple[int, ...]
 
     Returns
     -------
-    ndarray (..., *core)
+    ndarray (..., core)
 
     Raises
     ------

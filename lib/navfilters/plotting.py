@@ -382,20 +382,14 @@ def block_diagram(
         ax.text(x, y, text, ha="center", va="center", fontsize=9)
     for a, b, label, line, shift in arrows:
         start, end = np.array(boxes[a], float), np.array(boxes[b], float)
-        level = start[1] == end[1]
-        way = np.array([1, 0] if level else [0, 1]) * np.sign(end - start)
+        level = bool(start[1] == end[1])
+        way = np.where([level, not level], np.sign(end - start), 0.0)
         move = shift * np.array([-way[1], way[0]])
         start, end = start + way * half + move, end - way * half + move
-        style = {
-            "arrowstyle": "-|>",
-            "color": "0.25",
-            "linestyle": line,
-            "shrinkA": 0,
-            "shrinkB": 0,
-        }
-        ax.annotate("", end, start, arrowprops=style)
-        place = (start + end) / 2 + ([0, 0.12] if level else [0.06, 0])
-        ax.text(*place, label, fontsize=8, va="center", ha="center" if level else "left")
-    x, y = np.array(list(boxes.values())).T
-    ax.set(xlim=(x.min() - 0.7, x.max() + 1.4), ylim=(y.min() - 0.5, y.max() + 0.5))
+        style = {"arrowstyle": "-|>", "color": "0.25", "linestyle": line}
+        ax.annotate("", end, start, arrowprops={**style, "shrinkA": 0, "shrinkB": 0})
+        x, y = (start + end) / 2 + np.array([0, 0.12] if level else [0.06, 0])
+        ax.text(x, y, label, fontsize=8, va="center", ha="center" if level else "left")
+    (left, low), (right, high) = (f(list(boxes.values()), axis=0) for f in (np.min, np.max))
+    ax.set(xlim=(left - 0.7, right + 1.4), ylim=(low - 0.5, high + 0.5))
     ax.axis("off")

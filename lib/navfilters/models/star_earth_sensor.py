@@ -10,7 +10,7 @@ from navfilters.types import Array
 
 @dataclass(frozen=True, eq=False)
 class StarEarthSensor:
-    """The angle between each star and the Earth's centre: y_i = arccos(-u_i . r / |r|) + v_i.
+    """The angle between each star and the Earth's centre: y_i = arccos(-u_i . r / norm(r)) + v_i.
 
     Parameters
     ----------
@@ -27,8 +27,8 @@ class StarEarthSensor:
     Notes
     -----
     The arccosine loses half of the digits near 0 and pi, where the spacecraft lies in the line of
-    star and Earth; atan2(|u x r|, -u . r) keeps them. *On* that line the angle has no derivatives:
-    they are not finite there. The velocity does not enter.
+    star and Earth; atan2(norm(u x r), -u . r) keeps them. On that line the angle has no
+    derivatives: they are not finite there. The velocity does not enter.
 
     References
     ----------
@@ -73,9 +73,9 @@ class StarEarthSensor:
         return xp.atan2(xp.sqrt(xp.linalg.vecdot(w, w)), -xp.linalg.vecdot(u, r))
 
     def jacobian(self, x: Array) -> Array:
-        """H: across r and towards the star, 1/|r| long; zero for the velocity.
+        """H: across r and towards the star, 1 / norm(r) long; zero for the velocity.
 
-        H_i = r x (u_i x r) / (|r|^2 |u_i x r|)
+        H_i = r x (u_i x r) / (norm(r)^2 norm(u_i x r))
 
         Parameters
         ----------
@@ -93,7 +93,7 @@ class StarEarthSensor:
     def hessian(self, x: Array) -> Array:
         """Second derivatives of each angle, in the axes along r, towards the star, and normal n.
 
-        -(e_r e_t^T + e_t e_r^T + cot(theta) e_n e_n^T) / |r|^2,   theta the angle from u to r
+        -(e_r e_t^T + e_t e_r^T + cot(theta) e_n e_n^T) / norm(r)^2,   theta the angle from u to r
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class StarEarthSensor:
         return xp.concat([top, bottom], axis=-2)
 
     def _axes(self, x: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Unit vectors along r, towards the star and normal to both, |r| and cot(theta)."""
+        """Unit vectors along r, towards the star and normal to both, norm(r) and cot(theta)."""
         xp = x.__array_namespace__()
         u = xp.asarray(self.stars)
         position = x[..., None, :3] + xp.zeros_like(u)
