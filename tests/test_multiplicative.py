@@ -158,6 +158,35 @@ def test_the_error_is_corrected_in_the_direction_of_the_truth():
     assert_array_equal(made.innovation, before)
 
 
+def additive(mu, P, seen):
+    """An EKF whose attitude state is the rotation vector itself; returns the new one."""
+
+    def h(x):
+        state = MekfState(x[:3], x[3:6], from_rotation_vector(x[6:]), P)
+        return GEOMETRY.h(state, seen.r_f)
+
+    x = np.concatenate([R0 + 300.0, V0, mu])
+    steps = np.array([10.0] * 3 + [1e-2] * 3 + [1e-6] * 3)
+    H = np.stack([(h(x + d) - h(x - d)) / (2 * d.max()) for d in np.diag(steps)], axis=-1)
+    state = MekfState(x[:3], x[3:6], from_rotation_vector(mu), P)
+    y, _, noise = GEOMETRY.linearize(state, seen)
+    moved = kalman(x, P, y + H @ x, H, noise)[0]
+    return moved[6:], mekf_update(state, seen, GEOMETRY).state
+
+
+def test_for_small_angles_it_is_the_additive_filter():
+    """Of the way that both attitudes move, they differ by less than the angle."""
+    pixel = ellipsoid_intersection(R0, GEOMETRY.boresight(NOMINAL)) + 20.0
+    seen = Measurement(pixel, np.linalg.norm(pixel - R0), np.linalg.norm(V0))
+    for angle in (1e-2, 1e-3, 1e-4):
+        P = np.diag(np.concatenate([SIGMA[:6], [angle] * 3]) ** 2)
+        mu = angle * np.array([0.6, -0.5, 0.3])
+        plain_mu, state = additive(mu, P, seen)
+        moved = np.linalg.norm(plain_mu - mu)
+        apart = np.linalg.norm(rotation_vector(state.q_mu) - plain_mu)
+        assert apart < angle * moved, (angle, apart / moved)
+
+
 @given(st.integers(0, 2**32 - 1), st.floats(0, 2), st.floats(-3, 3))
 def test_covariance_stays_one_and_never_grows(seed, beta, exponent):
     """Symmetric to the bit, positive, P+ <= P, and a quaternion of length one."""
