@@ -4,11 +4,12 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 BUILT := _build/.complete
+BENCH := .venv-bench
 SOURCES := $(shell find book lib -type f -not -path '*/__pycache__/*' -not -name '.*' 2>/dev/null) \
 	_config.yml _toc.yml requirements.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help book test unit coverage lint notebooks nbval pages screens lock clean
+.PHONY: help book test unit coverage lint notebooks nbval pages screens bench lock clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1  /p' $(MAKEFILE_LIST) | awk '{printf "  make %-10s", $$1; $$1 = ""; print}'
@@ -47,13 +48,19 @@ notebooks: $(VENV)/.test  ## execute every notebook in place and refresh its sto
 screens: $(VENV)/.test $(BUILT)  ## every page as a picture: wide and 390 px, light and dark
 	$(BIN)/python tools/screens.py _build/html _build/screens
 
-lock:  ## refresh requirements.txt and requirements-test.txt from their .in lists
+bench: $(BENCH)/.ready  ## measure beside the peers and a C loop; store the results in benchmarks/
+	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/run.py
+	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/batches.py
+
+lock:  ## refresh the three requirements.txt from their .in lists
 	$(PYTHON) -m venv _build/lock
 	_build/lock/bin/pip install --quiet uv
 	_build/lock/bin/uv pip compile --quiet --upgrade --universal --generate-hashes \
 		--python-version 3.11 requirements.in -o requirements.txt
 	_build/lock/bin/uv pip compile --quiet --upgrade --universal --generate-hashes \
 		--python-version 3.11 requirements-test.in -o requirements-test.txt
+	_build/lock/bin/uv pip compile --quiet --upgrade --universal --generate-hashes \
+		--python-version 3.11 benchmarks/requirements.in -o benchmarks/requirements.txt
 
 $(VENV)/.book: requirements.txt pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -65,5 +72,13 @@ $(VENV)/.test: requirements-test.txt $(VENV)/.book
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-test.txt
 	@touch $@
 
+$(BENCH)/.ready: benchmarks/requirements.txt pyproject.toml
+	test -x $(BENCH)/bin/python || $(PYTHON) -m venv $(BENCH)
+	$(BENCH)/bin/pip install --quiet --disable-pip-version-check --require-hashes \
+		-r benchmarks/requirements.txt
+	$(BENCH)/bin/pip install --quiet --disable-pip-version-check --no-deps \
+		--no-build-isolation -e .
+	@touch $@
+
 clean:  ## remove what was built and the virtual environment
-	rm -rf _build $(VENV)
+	rm -rf _build $(VENV) $(BENCH)

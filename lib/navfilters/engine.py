@@ -66,10 +66,9 @@ def run(
             "estimator must be callable as estimator(prior, z, model), such as FILTERS['EKF']; "
             f"found {estimator!r}"
         )
-    if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or steps < 0:
-        raise ValueError(f"steps must be an integer of at least 0; found {steps!r}")
+    validation.whole_number("steps", steps, 0)
     prior = validation.gaussian("prior", prior)
-    z, batch = _measurements(z, prior, model, int(steps), z_varies)
+    z, batch = validation.measurements(z, prior, model, int(steps), z_varies)
     state, states = prior, [prior]
     with np.errstate(all="ignore"):  # a member that fails is NaN in the result: that is its report
         for k in range(steps):
@@ -81,40 +80,6 @@ def run(
         np.stack([np.broadcast_to(s.mean, (*batch, n)) for s in states]),
         np.stack([np.broadcast_to(s.cov, (*batch, n, n)) for s in states]),
     )
-
-
-def _measurements(z, prior, model, steps, z_varies) -> tuple[np.ndarray, tuple[int, ...]]:
-    """z as an array that fits the prior, the model and the number of steps; and the batch axes."""
-    axes = "steps, ..., m" if z_varies else "..., m"
-    z = validation.real_array("z", z, "m")
-    if z_varies and (z.ndim < 2 or z.shape[0] != steps):
-        raise ValueError(f"z must have shape ({axes}) with {steps} steps; found {z.shape}")
-    m = np.shape(model.R)[-1]
-    if z.shape[-1] != m:
-        raise ValueError(f"z must have shape ({axes}) with m = {m} as in model.R; found {z.shape}")
-    n = prior.mean.shape[-1]
-    with np.errstate(all="ignore"):
-        try:
-            H = model.jacobian(prior.mean)
-        except (ValueError, IndexError) as error:
-            raise ValueError(
-                f"prior.mean must be a state of the model; found shape {prior.mean.shape} ({error})"
-            ) from None
-    if H.shape[-1] != n:
-        raise ValueError(
-            f"prior.mean must have shape (..., {H.shape[-1]}) for this model; found "
-            f"{prior.mean.shape}"
-        )
-    batch = validation.batch(
-        **{
-            "prior.mean": prior.mean.shape[:-1],
-            "prior.cov": prior.cov.shape[:-2],
-            "z": z.shape[1:-1] if z_varies else z.shape[:-1],
-            "model.R": np.shape(model.R)[:-2],
-            "model.jacobian": H.shape[:-2],
-        }
-    )
-    return z, batch
 
 
 def first_indefinite(cov: Array) -> np.ndarray:

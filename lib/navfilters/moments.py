@@ -5,7 +5,7 @@ one of them, perhaps a variant of it, and the common update of :mod:`navfilters.
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -133,13 +133,15 @@ class SigmaPoints:
             if name == "alpha" and (value <= 0).any():
                 raise ValueError(f"alpha must be positive; found {value.min()}")
 
-    def weights(self, n: int) -> tuple[Array, Array, Array, Array]:
+    def weights(self, n: int, xp: Any = np) -> tuple[Array, Array, Array, Array]:
         """Scaling and weights for a state of size n.
 
         Parameters
         ----------
         n : int
             Size of the state.
+        xp : array namespace
+            Of the results.
 
         Returns
         -------
@@ -147,15 +149,16 @@ class SigmaPoints:
             (gamma, W0_m, W0_c, W_i): the scale of the offsets, the central point's weight in means
             and in covariances, and the weight of each of the 2 n other points.
         """
-        kappa = 3.0 - n if self.kappa is None else np.asarray(self.kappa, float)
-        if np.any(n + kappa <= 0):
+        given = 3.0 - n if self.kappa is None else self.kappa
+        known = isinstance(given, int | float | list | tuple | np.ndarray)  # not so while compiling
+        if known and np.any(n + np.asarray(given) <= 0):
             raise ValueError(
-                f"kappa must be larger than {-n} for a state of size {n}; found {kappa}"
+                f"kappa must be larger than {-n} for a state of size {n}; found {given}"
             )
-        alpha, beta = np.asarray(self.alpha, float), np.asarray(self.beta, float)
+        alpha, beta, kappa = (xp.asarray(v, dtype=float) for v in (self.alpha, self.beta, given))
         scale = alpha**2 * (n + kappa)  # n + lambda
         W0_m = 1 - n / scale
-        return np.sqrt(scale), W0_m, W0_m + 1 - alpha**2 + beta, 0.5 / scale
+        return xp.sqrt(scale), W0_m, W0_m + 1 - alpha**2 + beta, 0.5 / scale
 
 
 ROOTS = {"cholesky": linalg.cholesky, "symmetric": linalg.symmetric_root}
@@ -183,8 +186,8 @@ def sigma_points(prior: Gaussian, points: SigmaPoints) -> Array:
     """
     xp = prior.cov.__array_namespace__()
     n = prior.mean.shape[-1]
-    gamma, *_ = points.weights(n)
-    S = xp.asarray(gamma)[..., None, None] * ROOTS[points.root](prior.cov)
+    gamma, *_ = points.weights(n, xp)
+    S = gamma[..., None, None] * ROOTS[points.root](prior.cov)
     batch = xp.broadcast_shapes(S.shape[:-2], prior.mean.shape[:-1])
     columns = xp.moveaxis(xp.broadcast_to(S, (*batch, n, n)), -1, 0)
     return prior.mean + xp.concat([xp.zeros_like(columns[:1]), columns, -columns], axis=0)
@@ -221,7 +224,7 @@ def unscented(
     missing = model.R.ndim - X.ndim  # batch axes that only the model has go behind the points' axis
     X = xp.reshape(X, (X.shape[0], *(1,) * missing, *X.shape[1:]))
     Z = model.h(X)
-    _, _, W0_c, W_i = (xp.asarray(w) for w in points.weights(prior.mean.shape[-1]))
+    _, _, W0_c, W_i = points.weights(prior.mean.shape[-1], xp)
     # The weights sum to one. Summing differences keeps the digits that a large negative W0 would
     # cancel.
     z_hat = Z[0] + W_i[..., None] * xp.sum(Z[1:] - Z[0], axis=0)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from navfilters.types import Gaussian
+from navfilters.types import Gaussian, MeasurementModel
 
 SYMMETRY = 1e-9
 """Largest difference of a covariance from its transpose, as a correlation, taken for rounding."""
@@ -127,6 +127,31 @@ def gaussian(name: str, value: Any) -> Gaussian:
     return Gaussian(mean, cov)
 
 
+def whole_number(name: str, value: Any, least: int) -> int:
+    """A count.
+
+    Parameters
+    ----------
+    name : str
+        The argument, as the caller knows it.
+    value : int
+    least : int
+        The smallest that is allowed.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    ValueError
+        Not an integer, or too small; a bool is no count.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ValueError(f"{name} must be an integer of at least {least}; found {value!r}")
+    return int(value)
+
+
 def batch(**shapes: tuple[int, ...]) -> tuple[int, ...]:
     """The common batch shape of several arguments.
 
@@ -149,3 +174,67 @@ def batch(**shapes: tuple[int, ...]) -> tuple[int, ...]:
     except ValueError:
         found = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
         raise ValueError(f"leading (batch) axes must broadcast; found {found}") from None
+
+
+def measurements(
+    z: Any,
+    prior: Gaussian,
+    model: MeasurementModel,
+    steps: int,
+    z_varies: bool,
+    name: str = "prior",
+) -> tuple[np.ndarray, tuple[int, ...]]:
+    """Measurements that fit the prior, the model and the number of steps.
+
+    Parameters
+    ----------
+    z : array-like (..., m), or (steps, ..., m) with z_varies
+    prior : Gaussian
+        As :func:`gaussian` returns it.
+    model : MeasurementModel
+    steps : int
+    z_varies : bool
+    name : str
+        The prior's, as the caller knows it.
+
+    Returns
+    -------
+    z : ndarray
+    batch : tuple of int
+        The common batch axes of prior, z and model.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, values that are not finite, batch axes that do not broadcast.
+    """
+    axes = "steps, ..., m" if z_varies else "..., m"
+    z = real_array("z", z, "m")
+    if z_varies and (z.ndim < 2 or z.shape[0] != steps):
+        raise ValueError(f"z must have shape ({axes}) with {steps} steps; found {z.shape}")
+    m = np.shape(model.R)[-1]
+    if z.shape[-1] != m:
+        raise ValueError(f"z must have shape ({axes}) with m = {m} as in model.R; found {z.shape}")
+    n = prior.mean.shape[-1]
+    one = prior.mean[(slice(1),) * (prior.mean.ndim - 1)]  # a batch may be large
+    with np.errstate(all="ignore"):
+        try:
+            H = model.jacobian(one)
+        except (ValueError, IndexError) as error:
+            raise ValueError(
+                f"{name}.mean must be a state of the model; found shape {prior.mean.shape} "
+                f"({error})"
+            ) from None
+    if H.shape[-1] != n:
+        raise ValueError(
+            f"{name}.mean must have shape (..., {H.shape[-1]}) for this model; found "
+            f"{prior.mean.shape}"
+        )
+    shapes = {
+        f"{name}.mean": prior.mean.shape[:-1],
+        f"{name}.cov": prior.cov.shape[:-2],
+        "z": z.shape[1:-1] if z_varies else z.shape[:-1],
+        "model.R": np.shape(model.R)[:-2],
+        "model.jacobian": H.shape[:-2],
+    }
+    return z, batch(**shapes)

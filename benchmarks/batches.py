@@ -1,0 +1,105 @@
+"""A batch of Monte Carlo runs against a loop, and cost by size of state: part of ``make bench``.
+
+Both do the same runs with the same random numbers, on one core, in turns. The loop makes only a few
+of the runs, since each costs the same. Results are medians over the turns.
+
+The second part makes linear updates of two measurements for states of several sizes.
+"""
+
+import json
+import os
+import sys
+import time
+from datetime import date
+from pathlib import Path
+from statistics import median
+
+if hasattr(os, "sched_setaffinity"):
+    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})  # before any library counts the cores
+
+import jax
+import numpy as np
+
+from navfilters import FILTERS, Gaussian, sweep
+from navfilters.experiments import sar_trn, xiong2009
+from navfilters.models import Linear
+
+REPEATS = 5
+RESULTS = Path(__file__).with_name("batches.json")
+
+
+def orbit(runs: range) -> np.ndarray:
+    """The EKF through two burns: 200 updates, 100 sub-steps of 1 s between them."""
+    return xiong2009.rms_error("EKF", "B", runs)
+
+
+def images(runs: range) -> np.ndarray:
+    """The multiplicative EKF on radar images: 72 updates, 10 steps between them."""
+    return sar_trn.monte_carlo("TC-1", runs=list(runs)).errors[:, -1]
+
+
+CONTESTS = {
+    "orbit EKF, 20 runs": (orbit, range(20), 1),
+    "radar MEKF, 100 runs": (images, range(100), 2),
+}
+
+
+def compare(experiment, runs: range, some: int) -> dict[str, float]:
+    """Seconds for all runs as a batch, and for one after another, of which some are flown."""
+    together, alone, ratios = [], [], []
+    batch = experiment(runs)
+    single = np.concatenate([experiment(range(i, i + 1)) for i in range(some)])
+    apart = np.max(np.abs(batch[:some] - single) / np.abs(single))
+    for _ in range(REPEATS):
+        start = time.process_time()
+        experiment(runs)
+        together.append(time.process_time() - start)
+        start = time.process_time()
+        for i in range(some):
+            experiment(range(i, i + 1))
+        alone.append((time.process_time() - start) * len(runs) / some)
+        ratios.append(alone[-1] / together[-1])
+    return {
+        "batch_s": round(median(together), 2),
+        "loop_s": round(median(alone), 1),
+        "loop_over_batch": round(median(ratios), 1),
+        "apart": float(f"{apart:.1e}"),
+    }
+
+
+SIZES = (2, 3, 4, 6, 9, 12)
+MEMBERS, STEPS = 10_000, 20
+
+
+def grow(engine: str, n: int) -> float:
+    """Nanoseconds per update of the EKF on a linear model with n states."""
+    rng = np.random.default_rng(0)
+    model = Linear(rng.normal(size=(2, n)), np.eye(2))
+    priors = Gaussian(rng.normal(size=(MEMBERS, n)), np.tile(np.eye(n), (MEMBERS, 1, 1)))
+    options = {"engine": engine, "workers": 1, "progress": False}
+    spent = []
+    for _ in range(REPEATS + 1):  # the first compiles
+        start = time.process_time()
+        sweep(FILTERS["EKF"], priors, np.ones(2), model, STEPS, **options)
+        spent.append((time.process_time() - start) / (MEMBERS * STEPS) * 1e9)
+    return round(median(spent[1:]), 1)
+
+
+def main() -> None:
+    """Measure, print and write ``batches.json``."""
+    jax.config.update("jax_enable_x64", True)
+    result = {"date": date.today().isoformat(), "repeats": REPEATS, "results": {}, "sizes": {}}
+    for name, contest in CONTESTS.items():
+        found = result["results"][name] = compare(*contest)
+        sys.stdout.write(
+            f"{name:22} batch {found['batch_s']:6.2f} s, loop {found['loop_s']:6.1f} s: "
+            f"{found['loop_over_batch']:.1f} times; apart {found['apart']:.0e}\n"
+        )
+    for engine in ("numpy", "jax"):
+        found = result["sizes"][engine] = {str(n): grow(engine, n) for n in SIZES}
+        sys.stdout.write(f"{engine}: ns per update by states {found}\n")
+    RESULTS.write_text(json.dumps(result, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Synthetic aperture radar: from the echo to a position on the ground."""

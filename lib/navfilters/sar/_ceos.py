@@ -1,0 +1,294 @@
+"""Records of CEOS files: big-endian integers, ASCII numbers, and errors that name the byte.
+
+Offsets count from 0. A kind is a letter and a width in bytes: B an unsigned and S a signed
+big-endian integer, C a record's four one-byte codes, I an ASCII integer, F an ASCII real number of
+either Fortran format, A ASCII text.
+"""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from io import FileIO
+from pathlib import Path
+from typing import Any
+
+SPEED_OF_LIGHT = 299792458.0
+"""m/s."""
+HEADER = 12
+"""Bytes at the start of every record: sequence number, four codes, length."""
+_INTEGER = re.compile(r"[+-]?[0-9]+")
+_NUMBER = {
+    **dict.fromkeys("BSI", _INTEGER),
+    "F": re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([EDed][+-]?[0-9]{1,3})?"),
+}
+_CLOSE = 0.01
+"""Relative difference up to which two fields are taken to say the same."""
+
+
+def fault(path: Path, offset: int, name: str, found: Any, needed: str) -> ValueError:
+    """The error for a value that a file must not hold.
+
+    Parameters
+    ----------
+    path : Path
+    offset : int
+        From the start of the file, 0-based.
+    name : str
+        What is wrong.
+    found : object
+    needed : str
+
+    Returns
+    -------
+    ValueError
+    """
+    return ValueError(f"{path}, byte {offset}: {name} must be {needed}; found {found}")
+
+
+def take(file: FileIO, path: Path, start: int, length: int, name: str) -> bytes:
+    """Bytes of a file, all of them.
+
+    Parameters
+    ----------
+    file : FileIO
+        Open for reading.
+    path : Path
+    start, length : int
+        Bytes; the caller has compared them with the size of the file.
+    name : str
+        What is read.
+
+    Returns
+    -------
+    bytes (length,)
+
+    Raises
+    ------
+    ValueError
+        The file ends before.
+    """
+    file.seek(start)
+    data = file.read(length)
+    if len(data) < length:
+        found = f"the end of the file at byte {start + len(data)}"
+        raise fault(path, start, name, found, f"{length} bytes long")
+    return data
+
+
+@dataclass(frozen=True)
+class Field:
+    """Where a field stands in its record, and which values it may have.
+
+    Parameters
+    ----------
+    offset : int
+        From the start of the record.
+    kind : str
+        As in the module's docstring.
+    low, high : float
+        Smallest and largest number that is possible.
+    """
+
+    offset: int
+    kind: str
+    low: float = -math.inf
+    high: float = math.inf
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return int(self.kind[1:])
+
+    @property
+    def needed(self) -> str:
+        """What a number of this field must be, in words."""
+        if self.low == self.high:
+            return f"{self.low:.10g}"
+        kind = "a number" if self.kind[0] == "F" else "an integer"
+        return f"{kind} from {self.low:.10g} to {self.high:.10g}"
+
+
+def code_text(codes: bytes) -> str:
+    """The four codes of a record as the format's tables have them, such as "50 10 18 20"."""
+    return " ".join(map(str, codes))
+
+
+@dataclass(frozen=True)
+class Record:
+    """One record of a file.
+
+    Parameters
+    ----------
+    path : Path
+    start : int
+        Of the record in the file.
+    data : bytes
+    fields : mapping of str to Field
+    """
+
+    path: Path
+    start: int
+    data: bytes
+    fields: Mapping[str, Field]
+
+    def text(self, name: str) -> str:
+        """A field as it stands, without the blanks around it."""
+        field = self.fields[name]
+        raw = self.data[field.offset : field.offset + field.size]
+        if field.kind[0] == "C":
+            return code_text(raw)
+        if field.kind[0] in "BS":
+            return str(int.from_bytes(raw, "big", signed=field.kind[0] == "S"))
+        return raw.decode("latin-1").strip(" \0")
+
+    def number(self, name: str, blank: float | None = None, shift: int = 0) -> float:
+        """The value of a numeric field.
+
+        Parameters
+        ----------
+        name : str
+        blank : float, optional
+            What a blank field stands for; an error without.
+        shift : int
+            Bytes from the field to its repetition.
+
+        Returns
+        -------
+        float
+            Within the field's bounds, so finite; exact for integers.
+
+        Raises
+        ------
+        ValueError
+            No number, one out of bounds, or a blank field that has no meaning.
+        """
+        field = self.fields[name]
+        start = field.offset + shift
+        raw = self.data[start : start + field.size]
+        text = raw.decode("latin-1")
+        if field.kind[0] in "BS":
+            text = str(int.from_bytes(raw, "big", signed=field.kind[0] == "S"))
+        elif blank is not None and not text.strip(" \0"):
+            return blank
+        plain = text.strip(" ")
+        if _NUMBER[field.kind[0]].fullmatch(plain):
+            value = float(re.sub("[Dd]", "E", plain))
+            if field.low <= value <= field.high and math.isfinite(value):
+                return value
+        raise fault(self.path, self.start + start, name, repr(text), field.needed)
+
+    def integer(self, name: str, blank: int | None = None) -> int:
+        """As :meth:`number`, for a count."""
+        return int(self.number(name, blank))
+
+    def error(self, name: str, found: Any, needed: str, where: str = "") -> ValueError:
+        """The error for a field that contradicts something else."""
+        offset = self.start + self.fields[name].offset
+        return fault(self.path, offset, f"{name}{where}", found, needed)
+
+
+def header(file: FileIO, path: Path, start: int, size: int, name: str) -> tuple[bytes, int]:
+    """Codes and length of the record at a byte of a file.
+
+    Parameters
+    ----------
+    file : FileIO
+    path : Path
+    start : int
+    size : int
+        Of the file.
+    name : str
+        What the record is thought to be.
+
+    Returns
+    -------
+    codes : bytes (4,)
+    length : int
+        Positive, and within the file.
+
+    Raises
+    ------
+    ValueError
+    """
+    first = take(file, path, start, HEADER, name)
+    length = int.from_bytes(first[8:], "big")
+    if not HEADER <= length <= size - start:
+        swapped = int.from_bytes(first[8:], "little")
+        hint = " (the bytes are in the wrong order)" if HEADER <= swapped <= size - start else ""
+        needed = f"from {HEADER} to the {size - start} bytes that the file has left"
+        raise fault(path, start + 8, f"length of the {name}", f"{length}{hint}", needed)
+    return first[4:8], length
+
+
+def descriptor(
+    file: FileIO, path: Path, size: int, first_code: int | None, fields: Mapping[str, Field]
+) -> Record:
+    """The first record of a file.
+
+    Parameters
+    ----------
+    file : FileIO
+    path : Path
+    size : int
+        Of the file.
+    first_code : int or None
+        What its first sub-type code must be; None for any.
+    fields : mapping of str to Field
+
+    Returns
+    -------
+    Record
+        Of 720 bytes.
+
+    Raises
+    ------
+    ValueError
+        A file that is shorter, or another format's.
+    """
+    if size < 720:
+        raise fault(path, size, "file", f"its end at byte {size}", "at least 720 bytes long")
+    start = take(file, path, 0, HEADER, "file descriptor")
+    if (length := int.from_bytes(start[8:], "big")) == 16252:
+        raise fault(path, 8, "length of the file descriptor", "16252, ERSDAC's layout", "720")
+    if length != 720:
+        swapped = int.from_bytes(start[8:], "little") == 720
+        hint = " (720 in the wrong byte order)" if swapped else ""
+        raise fault(path, 8, "length of the file descriptor", f"{length}{hint}", "720")
+    if start[5:8] != b"\xc0\x12\x12" or first_code not in (None, start[4]):
+        needed = f"{'any' if first_code is None else first_code} 192 18 18"
+        raise fault(path, 4, "codes of the file descriptor", code_text(start[4:8]), needed)
+    return Record(path, 0, take(file, path, 0, 720, "file descriptor"), fields)
+
+
+def agreed(name: str, *claims: tuple[Record, str, float]) -> float:
+    """The one value that several fields give.
+
+    Parameters
+    ----------
+    name : str
+        What they are about.
+    *claims : (Record, str, float)
+        Record, field and value in common units; a value of 0 is none.
+
+    Returns
+    -------
+    float
+        The first that is given.
+
+    Raises
+    ------
+    ValueError
+        None given, or two that differ by more than 1 %.
+    """
+    given = [claim for claim in claims if claim[2]]
+    if not given:
+        record, field, _ = claims[0]
+        raise record.error(field, "blank or 0 in every field", f"given: the {name}")
+    record, field, value = given[0]
+    for other, their, claim in given[1:]:
+        if abs(claim - value) > _CLOSE * abs(value):
+            first = f"{record.path}, byte {record.start + record.fields[field].offset}"
+            needed = f"within 1 % of the {name} {value:.9g} at {first}"
+            raise other.error(their, f"{claim:.9g}", needed)
+    return value

@@ -1,0 +1,361 @@
+"""ALOS PALSAR level-1.0 products: raw echoes, and what is needed to focus them.
+
+A product is a folder with an image file IMG-... for each polarisation and a leader file LED-... in
+the agency's CEOS layout. ``python -m navfilters.sar.palsar FILE`` prints what a file holds.
+
+What public readers of the format disagree on, and the reading taken:
+
+- *Near range* is the prefix's slant range, whole metres, of an echo whose leading edge falls on the
+  first data sample. The field beside it, which may be finer, has no agreed unit and is not used.
+- *The chirp* falls in frequency. The file gives the magnitude; its sign there is not believed.
+- *Times* are as stored. One reader subtracts 2.0835 ms, found from corner reflectors, and products
+  made before 15 September 2006 are about 0.9 s off: see ``clock_offset``.
+"""
+
+import argparse
+import datetime
+import sys
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from navfilters.sar._ceos import SPEED_OF_LIGHT, Record, take
+from navfilters.sar._palsar_contents import contents
+from navfilters.sar._palsar_image import PREFIX, Headers, grid, read_headers
+from navfilters.sar._palsar_leader import (
+    StateVectors,
+    pulse,
+    read_leader,
+    state_vectors,
+    wavelength,
+)
+from navfilters.validation import real_array, whole_number
+
+MIDDLE = 15.5
+"""Zero signal, between the codes 15 and 16 of 0 to 31, where the leader gives none."""
+_TOP = 31  # the largest 5-bit code
+_BLOCK = 256  # lines that the Doppler estimate holds at once
+
+
+@dataclass(frozen=True, eq=False)
+class Product:
+    """A product that :func:`open_product` has checked; samples stay in the file until read.
+
+    Column k of every line is the echo at range near_range + k c / (2 sampling_rate), whatever the
+    line's own window was: that of the first line that is not missing counts for all.
+
+    Parameters
+    ----------
+    image, leader : Path
+    lines, samples : int
+        Shape of the whole image; lines that are missing count.
+    day : datetime.date
+        UTC day of the first line that is not missing; times are seconds from its start.
+    line_times : ndarray (lines,)
+        UTC seconds of the day, evenly spaced; known to a small part of a line where there are
+        thousands of lines, to 1 ms for two.
+    missing : ndarray (lines,) of bool
+        Lines without an echo: flagged as filled, absent from the file, or calibration data.
+    valid : ndarray (lines, 2)
+        Half-open range of the columns that hold samples; (0, 0) where missing.
+    prf : float
+        Lines a second of this polarisation, Hz.
+    near_range : float
+        Of column 0, m; whole metres, and so known to 0.5 m.
+    sampling_rate : float
+        Hz.
+    chirp_rate : float
+        Hz/s, negative.
+    pulse_length : float
+        s.
+    wavelength : float
+        m.
+    dc : complex
+        Code of zero signal, I + iQ.
+    polarisation : str
+        Transmitted, received: "HH", "HV", "VH" or "VV".
+    state_vectors : StateVectors
+        times (n,) in UTC seconds of the day, positions (n, 3) in m and velocities (n, 3) in m/s,
+        Earth-fixed.
+    """
+
+    image: Path
+    leader: Path
+    lines: int
+    samples: int
+    day: datetime.date
+    line_times: np.ndarray
+    missing: np.ndarray
+    valid: np.ndarray
+    prf: float
+    near_range: float
+    sampling_rate: float
+    chirp_rate: float
+    pulse_length: float
+    wavelength: float
+    dc: complex
+    polarisation: str
+    state_vectors: StateVectors
+    _origin: np.ndarray = field(repr=False)  # (lines,) bytes at which column 0 stands, or would
+
+    def read(self, first: int, last: int) -> np.ndarray:
+        """Echoes of some lines, without the code of zero signal.
+
+        Parameters
+        ----------
+        first, last : int
+            Lines, 0-based, half-open.
+
+        Returns
+        -------
+        ndarray (last - first, samples) of complex64
+            0 where nothing was received: missing lines, and columns outside of ``valid``.
+
+        Raises
+        ------
+        ValueError
+            Lines that the product does not have, or a file that has become shorter.
+        OSError
+
+        Warns
+        -----
+        UserWarning
+            Samples of more than 5 bits, with their number.
+        """
+        first, last = self._range(first, last)
+        echoes = np.zeros((last - first, self.samples), np.complex64)
+        zero = np.array([self.dc.real, self.dc.imag], np.float32)
+        over = 0
+        with open(self.image, "rb", buffering=0) as file:
+            for row, line in zip(echoes, range(first, last), strict=True):
+                start, stop = (int(column) for column in self.valid[line])
+                at, name = int(self._origin[line]) + 2 * start, f"line {line}"
+                raw = take(file, self.image, at, 2 * (stop - start), name)
+                codes = np.frombuffer(raw, np.uint8).reshape(-1, 2)
+                over += int(np.count_nonzero(codes > _TOP))
+                np.subtract(codes, zero, out=row[start:stop].view(np.float32).reshape(-1, 2))
+        if over:
+            warnings.warn(
+                f"{self.image}: {over} values of lines {first} to {last - 1} are above {_TOP}, "
+                "more than 5 bits hold",
+                stacklevel=2,
+            )
+        return echoes
+
+    def doppler_centroid(self, first: int, last: int) -> float:
+        """Mean Doppler frequency of some lines, from the phase between neighbours.
+
+        f = prf angle(sum conj(z[n]) z[n + 1]) / (2 pi)
+
+        Parameters
+        ----------
+        first, last : int
+            Lines, 0-based, half-open.
+
+        Returns
+        -------
+        float
+            Hz, between -prf / 2 and prf / 2: whole multiples of prf are not seen.
+
+        Raises
+        ------
+        ValueError
+            As :meth:`read`, or no two lines beside each other that hold echoes.
+        """
+        first, last = self._range(first, last)
+        together = 0j
+        for start in range(first, last - 1, _BLOCK):
+            z = self.read(start, min(start + _BLOCK + 1, last))
+            together += complex(np.vdot(z[:-1], z[1:]))
+        if together == 0:
+            raise ValueError(
+                f"first, last must hold two neighbours with echoes; found {first}, {last}"
+            )
+        return float(self.prf * np.angle(together) / (2 * np.pi))
+
+    def _range(self, first: int, last: int) -> tuple[int, int]:
+        first = whole_number("first", first, 0)
+        last = whole_number("last", last, first)
+        if last > self.lines:
+            raise ValueError(f"last must be at most the {self.lines} lines; found {last}")
+        return first, last
+
+
+def open_product(
+    folder: str | Path,
+    *,
+    polarisation: str | None = None,
+    records: tuple[int, int] | None = None,
+    clock_offset: float = 0.0,
+) -> Product:
+    """Read and check everything of a product but the samples.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Holds one leader file and the image files of one scene.
+    polarisation : str, optional
+        Such as "HV": which image file, where there are several.
+    records : tuple of int, optional
+        First and last signal record of the file, 0-based, half-open: one part of a product whose
+        pulse repetition frequency changes, which is refused as a whole. All by default.
+    clock_offset : float
+        Added to the times of lines, s.
+
+    Returns
+    -------
+    Product
+
+    Raises
+    ------
+    ValueError
+        A folder without exactly one image and leader file, or a file that is cut, damaged, another
+        format's or of another mode, with the file, the byte, what must be there and what was found.
+        ScanSAR bursts are refused.
+    OSError
+        A folder or file that cannot be read.
+
+    Warns
+    -----
+    UserWarning
+        Windows that move by parts of a sample, line times that scatter by more than their
+        resolution, a flagged leap second.
+    """
+    offset = float(real_array("clock_offset", clock_offset, ""))
+    image, leader = _files(Path(folder), polarisation)
+    said, headers = read_leader(leader), read_headers(image, records)
+    lines = grid(headers, _without_echo(headers, said.summary))
+    good, summary = lines.good, said.summary
+    letters = _polarisation(headers, good)
+    sampling_rate = 1e6 * summary.number("sampling rate in MHz")
+    near_range, shift, left, data = _windows(headers, good, sampling_rate)
+    samples = int(data[0])
+    valid = np.zeros((lines.lines, 2), np.int64)
+    valid[lines.rows] = np.clip(np.stack([shift, shift + data], axis=-1), 0, samples)
+    origin = np.zeros(lines.lines, np.int64)
+    origin[lines.rows] = headers.start(good) + PREFIX + 2 * (left - shift)
+    missing = np.ones(lines.lines, bool)
+    missing[lines.rows] = False
+    chirp_rate, pulse_length = pulse(summary, headers.record(int(good[0])), sampling_rate)
+    times, vectors = lines.times + offset, state_vectors(said.position, lines.day)
+    if not vectors.times[0] <= times[0] <= times[-1] <= vectors.times[-1]:
+        found = f"state vectors from {vectors.times[0]:.3f} to {vectors.times[-1]:.3f} s"
+        needed = f"such that they cover the lines, {times[0]:.3f} to {times[-1]:.3f} s"
+        raise said.position.error("second of day", f"{found} of {lines.day}", needed)
+    return Product(
+        image=image,
+        leader=leader,
+        lines=lines.lines,
+        samples=samples,
+        day=lines.day,
+        line_times=times,
+        missing=missing,
+        valid=valid,
+        prf=1 / lines.interval,
+        near_range=near_range,
+        sampling_rate=sampling_rate,
+        chirp_rate=chirp_rate,
+        pulse_length=pulse_length,
+        wavelength=wavelength(summary),
+        dc=complex(*(summary.number(f"DC bias of {part}", blank=MIDDLE) for part in "IQ")),
+        polarisation=letters,
+        state_vectors=vectors,
+        _origin=origin,
+    )
+
+
+def _files(folder: Path, polarisation: str | None) -> tuple[Path, Path]:
+    """The image and the leader file of a folder."""
+    wanted = "IMG-" if polarisation is None else f"IMG-{polarisation.upper()}-"
+    files = sorted(path for path in folder.iterdir() if path.is_file())
+    images, leaders = (
+        [path for path in files if path.name.upper().startswith(start)]
+        for start in (wanted, "LED-")
+    )
+    for found, name, hint in ((images, wanted, ": choose a polarisation"), (leaders, "LED-", "")):
+        if len(found) != 1:
+            names = ", ".join(path.name for path in found) or "none"
+            hint = hint if len(found) > 1 and polarisation is None else ""
+            raise ValueError(f"{folder} must hold one file {name}...; found {names}{hint}")
+    image, leader = images[0], leaders[0]
+    if not image.name.upper().endswith(leader.name.upper()[4:]):
+        raise ValueError(
+            f"{folder} must hold image and leader of one scene; found {image.name}, {leader.name}"
+        )
+    return image, leader
+
+
+def _without_echo(headers: Headers, summary: Record) -> np.ndarray:
+    """Which records (records,) are flagged as filled, or hold calibration data by the leader."""
+    bad = headers.values["missing-line flag"] == 1
+    if summary.integer("calibration data", blank=0):
+        number = headers.values["line number"]
+        for end in ("top", "bottom"):
+            first, last = (
+                summary.integer(f"{which} calibration line at the {end}", blank=0)
+                for which in ("first", "last")
+            )
+            bad |= (first <= number) & (number <= last)
+    return bad
+
+
+def _polarisation(headers: Headers, good: np.ndarray) -> str:
+    """Transmitted and received, as the lines say and the file's name must."""
+    letters = ""
+    named = headers.descriptor.path.name.upper().split("-")[1]
+    for k, which in enumerate(("transmit", "receive")):
+        field = f"{which} polarisation"
+        letter = "HV"[headers.within(field, good)[0]]
+        if named in ("HH", "HV", "VH", "VV") and named[k] != letter:
+            needed = f"{'HV'.index(named[k])} ({named[k]}), as the file's name says"
+            raise headers.record(int(good[0])).error(field, f"{'HV'.index(letter)}", needed)
+        letters += letter
+    return letters
+
+
+def _windows(
+    headers: Headers, good: np.ndarray, sampling_rate: float
+) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+    """Near range of the first line, m; shift, left fill and data of every line (n,), samples."""
+    slant = headers.within("slant range in m", good)
+    left, data, right = (
+        headers.within(f"{name} samples", good) for name in ("left fill", "data", "right fill")
+    )
+    room = (headers.length - PREFIX) // 2
+    needed = f"at most {room} with the fill samples"
+    headers.refuse("data samples", good, left + data + right > room, needed)
+    exact = 2 * sampling_rate / SPEED_OF_LIGHT * (slant - slant[0])
+    shift = np.rint(exact).astype(np.int64)
+    apart = (shift >= data[0]) | (shift + data <= 0)
+    needed = f"such that the window meets that of the first line, at {slant[0]} m"
+    headers.refuse("slant range in m", good, apart, needed)
+    if (off := np.abs(exact - shift).max()) > 0.25:  # whole metres explain 0.21 at 32 MHz
+        warnings.warn(
+            f"{headers.descriptor.path}: the window moves by parts of a sample, up to {off:.2f}",
+            stacklevel=3,
+        )
+    return float(slant[0]), shift, left, data
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print what a file holds: ``python -m navfilters.sar.palsar FILE``.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Those of the command line by default.
+    """
+    parser = argparse.ArgumentParser(description="What an ALOS PALSAR level-1.0 file holds.")
+    parser.add_argument("file", help="image or leader file")
+    try:
+        text = contents(Path(parser.parse_args(arguments).file))
+    except (ValueError, OSError) as error:
+        sys.exit(f"{error}")
+    sys.stdout.write(f"{text}\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,218 @@
+"""Some members of a sweep, all steps: what one process does in one go, whatever the engine."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from navfilters.linalg import is_positive_definite
+from navfilters.sweeping.trees import Tree, unflatten
+from navfilters.types import Array, Gaussian
+
+
+class SweepError(RuntimeError):
+    """A filter or a model raised an exception: for which configuration, and which."""
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """What all chunks of a sweep have in common.
+
+    Parameters
+    ----------
+    engine : {"numpy", "jax"}
+    tree : Tree
+        Of (estimator, prior, z, model, truth).
+    axes : tuple of (int or None)
+        Where each of its arrays has its members; None where they share it.
+    grid : tuple of int
+        The batch axes of the sweep, (1,) for a single configuration.
+    steps : int
+    keep : tuple of str
+        Names of what is kept.
+    z_varies : bool
+        Whether z and truth are series over the steps.
+    """
+
+    engine: str
+    tree: Tree
+    axes: tuple[int | None, ...]
+    grid: tuple[int, ...]
+    steps: int
+    keep: tuple[str, ...]
+    z_varies: bool
+
+
+class Chunk(NamedTuple):
+    """Some members.
+
+    Parameters
+    ----------
+    number : int
+    members : int array (k,)
+        Their numbers in the flattened batch; the last may repeat, to fill up a compiled shape.
+    arrays : list of ndarray
+        The leaves of the job's tree, for these members.
+    """
+
+    number: int
+    members: np.ndarray
+    arrays: list[np.ndarray]
+
+
+class Carry(NamedTuple):
+    """What goes from step to step."""
+
+    state: Any
+    indefinite: Array
+
+
+class Row(NamedTuple):
+    """What is kept of each step: None if it is not asked for."""
+
+    error: Array | None
+    history: Gaussian | None
+
+
+class Kept(NamedTuple):
+    """What is kept of a chunk: None if it is not asked for."""
+
+    final: Any
+    indefinite: Array | None
+    rows: Row
+
+
+class March:
+    """The steps of a job for some members, in functions that run and compile.
+
+    Parameters
+    ----------
+    job : Job
+    arrays : list of array
+        The leaves of its tree.
+    """
+
+    def __init__(self, job: Job, arrays: list[Array]) -> None:
+        self.job = job
+        problem = unflatten(job.tree, arrays)
+        self.estimator, self.prior, self.z, self.model, self.truth = problem
+        self.remembers = hasattr(self.estimator, "step")
+
+    def start(self) -> tuple[Carry, Row]:
+        """Before any step."""
+        xp = self.prior.mean.__array_namespace__()
+        state = self.estimator.init(self.prior) if self.remembers else self.prior
+        never = xp.full(self.prior.mean.shape[:-1], -1)
+        return self._look(0, state, never, self._at(self.truth, 0))
+
+    def advance(self, carry: Carry, k: Array, z: Array, truth: Array | None) -> tuple[Carry, Row]:
+        """Step k, counted from 1."""
+        if self.remembers:
+            state = self.estimator.step(carry.state, z, *self.model)
+        else:
+            state = self.estimator(carry.state, z, self.model)
+        return self._look(k, state, carry.indefinite, truth)
+
+    def step(self, carry: Carry, k: int) -> tuple[Carry, Row]:
+        """Step k, with its measurement and its truth."""
+        return self.advance(carry, k, self._at(self.z, k - 1), self._at(self.truth, k))
+
+    def finish(self, carry: Carry, rows: Row) -> Kept:
+        """The result, of the rows of all steps."""
+        keep = self.job.keep
+        return Kept(
+            carry.state if "final" in keep else None,
+            carry.indefinite if "indefinite" in keep else None,
+            rows,
+        )
+
+    def _at(self, series: Array, k: int) -> Array:
+        return series[k] if self.job.z_varies and series is not None else series
+
+    def _look(self, k: Array, state: Any, lost: Array, truth: Array | None) -> tuple[Carry, Row]:
+        estimate, keep = state.estimate if self.remembers else state, self.job.keep
+        xp = estimate.mean.__array_namespace__()
+        error = None
+        if "indefinite" in keep:
+            now = (lost < 0) & ~is_positive_definite(estimate.cov)
+            lost = xp.where(now, k, lost)
+        if truth is not None:
+            miss = estimate.mean[..., : truth.shape[-1]] - truth
+            error = xp.linalg.vector_norm(miss, axis=-1)
+        return Carry(state, lost), Row(error, estimate if "history" in keep else None)
+
+
+def compute(job: Job, chunk: Chunk) -> Kept:
+    """All steps of a chunk.
+
+    Parameters
+    ----------
+    job : Job
+    chunk : Chunk
+
+    Returns
+    -------
+    Kept
+        Of NumPy arrays.
+
+    Raises
+    ------
+    SweepError
+        What the filter or the model raised, naming the configuration that caused it.
+    """
+    go: Callable[[Job, list[np.ndarray]], Kept] = by_numpy
+    if job.engine == "jax":
+        from navfilters.sweeping.compiled import by_jax as go
+    try:
+        return go(job, chunk.arrays)
+    except Exception as error:
+        guilty = [chunk.members[0], chunk.members[-1]]  # JAX raises when it compiles: for all
+        if job.engine == "numpy":
+            guilty, error = _guilty(job, chunk, error)
+        name = "configuration " + " to ".join(_name(job, member) for member in guilty)
+        raise SweepError(f"{name}: {type(error).__name__}: {error}") from error
+
+
+def by_numpy(job: Job, arrays: list[np.ndarray]) -> Kept:
+    """All steps under NumPy."""
+    march = March(job, arrays)
+    with np.errstate(all="ignore"):  # a member that fails is NaN in the result: that is its report
+        carry, row = march.start()
+        rows = [row]
+        for k in range(1, job.steps + 1):
+            carry, row = march.step(carry, k)
+            rows.append(row)
+    errors, states = zip(*rows, strict=True)
+    error = np.stack(errors) if "error" in job.keep else None
+    history = Gaussian(*map(np.stack, zip(*states, strict=True))) if "history" in job.keep else None
+    return march.finish(carry, Row(error, history))
+
+
+def _guilty(job: Job, chunk: Chunk, error: Exception) -> tuple[list[int], Exception]:
+    """The first member that raises alone, found by halving; or the chunk's first and last."""
+    first, last = 0, len(chunk.members)
+    while last - first > 1:
+        middle = (first + last) // 2
+        for half in (slice(first, middle), slice(middle, last)):
+            try:
+                by_numpy(job, _some(job, chunk.arrays, half))
+            except Exception as caught:
+                first, last, error = half.start, half.stop, caught
+                break
+        else:  # only together
+            return [int(chunk.members[first]), int(chunk.members[last - 1])], error
+    return [int(chunk.members[first])], error
+
+
+def _some(job: Job, arrays: list[np.ndarray], members: slice) -> list[np.ndarray]:
+    return [
+        array if axis is None else array[(*(slice(None),) * axis, members)]
+        for array, axis in zip(arrays, job.axes, strict=True)
+    ]
+
+
+def _name(job: Job, member: int) -> str:
+    """A member's index in the batch axes: a number where there is one axis."""
+    index = tuple(int(i) for i in np.unravel_index(member, job.grid))
+    return str(index[0] if len(index) == 1 else index)

@@ -1,0 +1,33 @@
+"""A short flight, and a radar whose aperture is a quarter of PALSAR's, so that images are small."""
+
+from dataclasses import replace
+
+import pytest
+
+from navfilters.experiments.sar_trn import NOMINAL, Setup, truth
+from navfilters.frames import ellipsoid_intersection
+from navfilters.sar.echo import Flight, Radar
+
+
+@pytest.fixture(scope="session")
+def setup():
+    return Setup()
+
+
+@pytest.fixture(scope="session")
+def flight(setup):
+    return Flight.through(setup.orbit.derivative, truth(setup, 1).x[1], 3.0)
+
+
+@pytest.fixture(scope="session")
+def hit(setup):
+    """Where the boresight meets the ellipsoid at the epoch of the flight."""
+    known = truth(setup, 1)
+    beam = replace(setup.geometry, T_e_b=known.T_e_b[1]).boresight(NOMINAL)
+    return ellipsoid_intersection(known.x[1, :3], beam)
+
+
+@pytest.fixture(scope="session")
+def small():
+    """A quarter of PALSAR's wavelength and a seventh of its pulse; the same resolution."""
+    return Radar(wavelength=0.059, pulse_length=4e-6)

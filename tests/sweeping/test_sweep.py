@@ -1,0 +1,389 @@
+"""What a sweep returns: run's numbers, whatever the chunk, and every input that is refused."""
+
+import tracemalloc
+from dataclasses import dataclass, field
+from functools import partial
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from moving import WITH_MEMORY, moving
+from naive import covariances, quadratic
+from numpy.testing import assert_array_equal
+
+from navfilters import FILTERS, Gaussian, SigmaPoints, SweepError, first_indefinite, run, sweep
+from navfilters.experiments.perea2007 import Setup, position_error
+from navfilters.models import Linear, RangeBearing
+from navfilters.robust import ExtendedKalman
+from navfilters.sweeping.problems import CACHED, SENT, Problem
+
+BASE = Setup()
+MODEL = BASE.model
+EKF = FILTERS["EKF"]
+quiet = partial(sweep, progress=False)
+
+
+def priors(count=11, seed=0):
+    rng = np.random.default_rng(seed)
+    return Gaussian(rng.normal(BASE.x0, 10.0, (count, 2)), 2e3 * covariances(rng, (count,), 2))
+
+
+def assert_same(got, wanted):
+    """Bit for bit."""
+    for ours, theirs in zip(got, wanted, strict=True):
+        assert_array_equal(ours, theirs)
+
+
+# --- what is kept -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("steps", [0, 1, 2, 25])
+@pytest.mark.parametrize("name", ["EKF", "B-EKF 4", "mtSOF", "UKF"])
+def test_everything_kept_is_that_of_a_run(name, steps):
+    truth = np.array(BASE.x_true)
+    got = quiet(
+        FILTERS[name],
+        priors(),
+        BASE.z,
+        MODEL,
+        steps,
+        keep=["history", "error", "final", "indefinite"],
+        truth=truth,
+        chunk=4,
+    )
+    wanted = run(FILTERS[name], priors(), BASE.z, MODEL, steps)
+    assert_same(got.history, wanted)
+    assert_same(got.final, (wanted.mean[-1], wanted.cov[-1]))
+    assert_array_equal(got.indefinite, first_indefinite(wanted.cov))
+    assert_array_equal(got.error, position_error(wanted.mean, truth))
+
+
+def test_only_what_is_asked_for_is_kept():
+    got = quiet(EKF, priors(), BASE.z, MODEL, 3)
+    assert isinstance(got.final, Gaussian)
+    assert got.indefinite is got.error is got.history is None
+    got = quiet(EKF, priors(), BASE.z, MODEL, 3, keep={"indefinite"})
+    assert got.final is None
+    assert got.indefinite.tolist() == [-1] * 11
+
+
+def test_where_the_papers_filters_lose_definiteness():
+    """Sections V and VI: the mtSOF at its first update, the bumped one at the 23rd."""
+    for name, step in (("mtSOF", 1), ("B-mtSOF", 23), ("EKF", -1)):
+        got = quiet(FILTERS[name], BASE.prior, BASE.z, MODEL, 30, keep=["indefinite"])
+        assert got.indefinite == step
+
+
+def test_one_configuration_has_no_batch_axes():
+    got = quiet(EKF, BASE.prior, BASE.z, MODEL, 5, keep=["final", "history"])
+    assert got.final.mean.shape == (2,)
+    assert got.history.cov.shape == (6, 2, 2)
+    wanted = run(EKF, Gaussian(BASE.prior.mean[None], BASE.prior.cov[None]), BASE.z, MODEL, 5)
+    assert_array_equal(got.history.cov, wanted.cov[:, 0])
+
+
+def test_a_truth_may_move_and_have_fewer_components():
+    rng = np.random.default_rng(2)
+    z = BASE.z + rng.normal(size=(4, 11, 2)) * [1.0, 0.01]
+    truth = rng.normal(size=(5, 1, 1))
+    got = quiet(EKF, priors(), z, MODEL, 4, keep=["error"], truth=truth, z_varies=True, chunk=3)
+    mean = run(EKF, priors(), z, MODEL, 4, z_varies=True).mean
+    assert_array_equal(got.error, np.abs(mean[..., 0] - truth[..., 0]))
+
+
+# --- batches and chunks -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_members_do_not_depend_on_chunk_or_order(name):
+    wanted = quiet(FILTERS[name], priors(37), BASE.z, MODEL, 12).final
+    for chunk in (2, 5, 36, 1000):
+        assert_same(quiet(FILTERS[name], priors(37), BASE.z, MODEL, 12, chunk=chunk).final, wanted)
+    order = np.random.default_rng(1).permutation(37)
+    shuffled = Gaussian(*(part[order] for part in priors(37)))
+    got = quiet(FILTERS[name], shuffled, BASE.z, MODEL, 12, chunk=7).final
+    assert_same(got, (part[order] for part in wanted))
+
+
+FIVE = np.linspace(0.5, 2.5, 5)
+MANY = {
+    "mean": BASE.prior.mean * FIVE[:, None],
+    "cov": BASE.prior.cov * FIVE[:, None, None],
+    "z": BASE.z * FIVE[:, None] * [1.0, 0.4],
+    "R": MODEL.R * FIVE[:, None, None],
+    "bump": FIVE,
+    "alpha": FIVE,
+    "kappa": FIVE,
+}
+
+
+@pytest.mark.parametrize(
+    "batched", [[key] for key in MANY] + [["mean", "cov"], ["z", "bump", "alpha"], [*MANY]]
+)
+def test_any_argument_may_be_a_batch(batched):
+    """Options, models and measurements are dealt out with their configurations."""
+    one = {"mean": BASE.prior.mean, "cov": BASE.prior.cov, "z": BASE.z, "R": MODEL.R}
+    one |= {"bump": 1.0, "alpha": 0.9, "kappa": 1.0}
+
+    def arguments(mean, cov, z, R, bump, alpha, kappa):
+        filter_ = partial(FILTERS["B-UKF"], bump=bump, points=SigmaPoints(alpha, 2.0, kappa))
+        return filter_, Gaussian(mean, cov), z, RangeBearing(R), 4
+
+    given = arguments(**one | {key: MANY[key] for key in batched})
+    got = quiet(*given, chunk=2).final
+    wanted = run(*given)
+    np.testing.assert_allclose(got.mean, wanted.mean[-1], rtol=1e-10)
+    np.testing.assert_allclose(got.cov, wanted.cov[-1], rtol=0, atol=1e-13 * 1e4)
+
+
+def test_batch_axes_form_a_grid():
+    """Two priors by three noises by four bumps, in chunks that cut across."""
+    prior = Gaussian(*(part[:2, None, None] for part in priors()))
+    model = RangeBearing(MODEL.R * np.array([1.0, 10.0, 1e3])[:, None, None, None])
+    bumped = partial(FILTERS["B-EKF 1"], bump=[0.0, 1.0, 2.0, 3.0])
+    got = quiet(bumped, prior, BASE.z, model, 3, keep=["final", "history", "indefinite"], chunk=5)
+    assert got.final.mean.shape == (2, 3, 4, 2)
+    assert got.history.cov.shape == (4, 2, 3, 4, 2, 2)
+    assert got.indefinite.shape == (2, 3, 4)
+    one = partial(FILTERS["B-EKF 1"], bump=2.0)
+    alone = run(one, Gaussian(*(p[1] for p in priors())), BASE.z, RangeBearing(MODEL.R * 10.0), 3)
+    np.testing.assert_allclose(got.history.mean[:, 1, 1, 2], alone.mean, rtol=1e-12)
+
+
+def test_a_measurement_that_varies_is_dealt_out_too():
+    z = BASE.z + np.random.default_rng(0).normal(size=(6, 11, 2)) * [1.0, 0.01]
+    got = quiet(EKF, priors(), z, MODEL, 6, z_varies=True, chunk=4).final
+    wanted = run(EKF, priors(), z, MODEL, 6, z_varies=True)
+    assert_same(got, (wanted.mean[-1], wanted.cov[-1]))
+    z = z[:, :1]
+    got = quiet(EKF, priors(), z[:, 0], MODEL, 6, z_varies=True, chunk=4).final
+    wanted = run(EKF, priors(), z, MODEL, 6, z_varies=True)
+    np.testing.assert_allclose(got.mean, wanted.mean[-1], rtol=1e-12)
+
+
+def test_a_batch_of_linear_models():
+    rng = np.random.default_rng(0)
+    model = Linear(rng.normal(size=(5, 2, 2)), covariances(rng, (), 2))
+    got = quiet(EKF, BASE.prior, [0.5, -0.5], model, 3, chunk=2).final
+    wanted = run(
+        EKF, Gaussian(np.tile(BASE.prior.mean, (5, 1)), BASE.prior.cov), [0.5, -0.5], model, 3
+    )
+    np.testing.assert_allclose(got.mean, wanted.mean[-1], rtol=1e-12)
+
+
+def test_a_model_without_batch_axes_is_shared_whatever_it_holds():
+    """Three configurations of a model whose arrays have three rows."""
+    rng = np.random.default_rng(1)
+    model = quadratic(rng, 3, 3)
+    prior = Gaussian(rng.normal(size=(3, 3)), covariances(rng, (3,), 3))
+    got = quiet(EKF, prior, np.ones(3), model, 2, chunk=2).final
+    assert_same(got, (part[-1] for part in run(EKF, prior, np.ones(3), model, 2)))
+
+
+@dataclass(frozen=True, eq=False)
+class Offset:
+    """h(x) = x + offset: a model with one vector per configuration."""
+
+    R: np.ndarray
+    offset: np.ndarray = field(metadata={"axes": 1})
+
+    def h(self, x):
+        return x + self.offset
+
+    def jacobian(self, x):
+        return np.eye(2)
+
+
+def test_a_field_says_how_many_axes_one_value_has():
+    rng = np.random.default_rng(2)
+    model = Offset(covariances(rng, (5,), 2), rng.normal(size=(5, 2)))
+    got = quiet(EKF, priors(5), BASE.z, model, 2, chunk=2).final
+    assert_same(got, (part[-1] for part in run(EKF, priors(5), BASE.z, model, 2)))
+
+
+def test_a_member_that_fails_is_nan_alone():
+    """At the origin the EKF has no derivative: no warning, no exception."""
+    mean = priors().mean.copy()
+    mean[4] = 0.0
+    got = quiet(EKF, Gaussian(mean, priors().cov), BASE.z, MODEL, 5, keep=["final", "indefinite"])
+    healthy = quiet(EKF, priors(), BASE.z, MODEL, 5).final
+    others = np.arange(11) != 4
+    for ours, wanted in zip(got.final, healthy, strict=True):
+        assert_array_equal(ours[others], wanted[others])
+        assert np.isnan(ours[4]).all()
+    assert got.indefinite.tolist() == [-1] * 4 + [1] + [-1] * 6
+
+
+# --- filters with a memory ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", WITH_MEMORY)
+def test_filters_with_a_memory_go_step_by_step(name):
+    """The final state has the counters; the history is of the estimates."""
+    prior, z, model, steps = moving()
+    got = quiet(
+        WITH_MEMORY[name], prior, z, model, steps, z_varies=True, keep=["final", "history"], chunk=4
+    )
+    state, states = WITH_MEMORY[name].init(prior), [prior]
+    for k in range(steps):
+        state = WITH_MEMORY[name].step(state, z[k], *model)
+        states.append(state.estimate)
+    assert type(got.final) is type(state)
+    assert_same(got.final.estimate, state.estimate)
+    assert_same(got.final[1:], state[1:])
+    assert_same(got.history, map(np.stack, zip(*states, strict=True)))
+
+
+def test_a_filter_with_a_memory_and_no_steps():
+    prior, _, model, _ = moving()
+    got = quiet(ExtendedKalman(), prior, np.zeros(2), model, 0)
+    assert_same(got.final.estimate, prior)
+
+
+# --- sizes --------------------------------------------------------------------------------------
+
+
+def size_of(count, n=2, steps=1, series_bytes=0):
+    prior = Gaussian(np.ones((count, n)), np.eye(n))
+    model = Linear(np.eye(n), np.eye(n))
+    return Problem.of(EKF, prior, np.ones(n), model, None, 1, False).size(steps, series_bytes)
+
+
+def test_chunks_are_equal_and_fit_the_cache():
+    most = CACHED // 4
+    assert [size_of(count) for count in (1, 100, most)] == [1, 100, most]
+    assert size_of(most + 2) == most // 2 + 1
+    assert size_of(10**6, n=8) == pytest.approx(CACHED // 64, rel=0.01)
+    assert size_of(10**4, series_bytes=SENT // 50) == 50
+    assert size_of(10, series_bytes=2 * SENT) == 1
+
+
+def test_long_sweeps_have_chunks_for_several_workers():
+    assert size_of(10**5, steps=1000) == pytest.approx(10**5 / 8, rel=0.01)
+    assert size_of(10**4, steps=1000) == 10**4
+    assert size_of(10**4, steps=1001) == 2000  # not 1250, which costs a quarter more
+    assert size_of(10**6, steps=1000) == pytest.approx(CACHED // 4, rel=0.02)
+
+
+def test_a_series_that_is_given_counts_too():
+    z = np.broadcast_to(BASE.z, (1000, 11, 2))
+    problem = Problem.of(EKF, priors(), z, MODEL, None, 1000, True)
+    assert problem.size(1000, SENT // 2 - 1000) == 1
+    assert problem.size(1000, 0) == 11
+
+
+# --- memory --------------------------------------------------------------------------------------
+
+
+def peak(count, **options):
+    """Bytes allocated at one time during a sweep, without its input."""
+    many = Gaussian(np.tile(BASE.x0, (count, 1)), np.tile(np.eye(2), (count, 1, 1)))
+    tracemalloc.start()
+    quiet(EKF, many, BASE.z, MODEL, keep=["final", "indefinite"], **options)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return most
+
+
+def test_memory_per_configuration_is_small_and_does_not_grow_with_the_steps():
+    """A million of them: 24 doubles each for the result and the check of the input, 0.2 GB."""
+    peak(10, steps=1)  # imports
+    small, large = (peak(count, steps=2, chunk=500) for count in (4000, 40000))
+    assert (large - small) / 36000 < 24 * 8
+    assert peak(4000, steps=20, chunk=500) < 1.2 * small
+
+
+# --- what is refused ----------------------------------------------------------------------------
+
+REFUSED = {
+    "priors: a tuple": ({"priors": ([0.0, 0.0], np.eye(2))}, "priors must be a Gaussian.*tuple"),
+    "priors: indefinite": (
+        {"priors": Gaussian([1.0, 2.0], -np.eye(2))},
+        r"priors.cov.*eigenvalue -1",
+    ),
+    "priors: three components": (
+        {"priors": Gaussian(np.ones(3), np.eye(3))},
+        r"priors.mean.*\(3,\)",
+    ),
+    "priors: none": (
+        {"priors": Gaussian(np.ones((0, 2)), np.eye(2))},
+        r"priors.*at least one configuration; found.*\(0,\)",
+    ),
+    "z: NaN": ({"z": [1.0, np.nan]}, "z must be.*nan"),
+    "z: too few": (
+        {"z": np.ones((4, 2)), "z_varies": True},
+        r"z must have.*5 steps; found \(4, 2\)",
+    ),
+    "z: other batch": ({"z": np.ones((3, 2))}, r"broadcast; found.*priors.mean \(11,\).*z \(3,\)"),
+    "model: other batch": (
+        {"model": RangeBearing(np.stack([np.eye(2)] * 3))},
+        r"broadcast; found.*model.R \(3,\)",
+    ),
+    "model: opaque batch": (
+        {
+            "model": SimpleNamespace(
+                R=np.stack([np.eye(2)] * 11), h=MODEL.h, jacobian=MODEL.jacobian
+            )
+        },
+        "model must be a dataclass if it has batch axes.*SimpleNamespace",
+    ),
+    "option: other batch": (
+        {"estimator": partial(FILTERS["B-EKF 1"], bump=np.ones(3))},
+        r"broadcast; found.*estimator.bump \(3,\)",
+    ),
+    "option: other batch, inside": (
+        {"estimator": partial(FILTERS["UKF"], points=SigmaPoints([0.5, 0.7, 1.0]))},
+        r"broadcast; found.*estimator.points.alpha \(3,\)",
+    ),
+    "steps": ({"steps": -1}, "steps must be an integer of at least 0; found -1"),
+    "engine": ({"engine": "torch"}, "engine must be 'numpy' or 'jax'; found 'torch'"),
+    "keep: a string": ({"keep": "final"}, "keep must be a collection.*found 'final'"),
+    "keep: unknown": ({"keep": ["last"]}, r"keep must be a collection.*found \['last'\]"),
+    "keep: nothing": ({"keep": []}, r"keep must be.*found \[\]"),
+    "truth: missing": ({"keep": ["error"]}, "truth must be given if.*no truth"),
+    "truth: unused": ({"truth": [1.0, 2.0]}, "truth must be given if.*a truth"),
+    "truth: too many": (
+        {"keep": ["error"], "truth": np.ones(3)},
+        r"truth must have shape \(..., k\) with k up to 2; found \(3,\)",
+    ),
+    "truth: too few steps": (
+        {"keep": ["error"], "truth": np.ones((5, 2)), "z": np.ones((5, 2)), "z_varies": True},
+        r"truth must have shape \(6, ..., k\).*found \(5, 2\)",
+    ),
+    "workers": ({"workers": 0}, "workers must be an integer of at least 1; found 0"),
+    "chunk": ({"chunk": 1.5}, "chunk must be an integer of at least 1; found 1.5"),
+    "memory: one model": ({"estimator": ExtendedKalman()}, r"model must be \(dynamics, sensor\)"),
+}
+
+
+def never(prior, z, model):
+    raise AssertionError("the estimator was called before its inputs were checked")
+
+
+@pytest.mark.parametrize(("changes", "message"), REFUSED.values(), ids=REFUSED)
+def test_bad_input_is_refused_before_any_step(changes, message):
+    arguments = {"estimator": never, "priors": priors(), "z": BASE.z, "model": MODEL, "steps": 5}
+    with pytest.raises(ValueError, match=f"(?s){message}"):
+        quiet(**arguments | changes)
+
+
+def test_an_estimator_that_is_none_is_refused():
+    with pytest.raises(TypeError, match=r"estimator must be callable.*init and step; found 'EKF'"):
+        quiet("EKF", priors(), BASE.z, MODEL, 5)
+
+
+@pytest.mark.parametrize(
+    "estimator",
+    [
+        lambda prior, z, model: Gaussian(prior.mean[0], prior.cov),
+        lambda prior, z, model: Gaussian(np.float64(1.0), np.float64(1.0)),
+    ],
+)
+def test_a_result_without_its_configurations_is_refused(estimator):
+    with pytest.raises(ValueError, match=r"estimator must return arrays whose first axis"):
+        quiet(estimator, priors(), BASE.z, MODEL, 5)
+
+
+def test_an_option_that_the_filter_lacks_is_refused():
+    with pytest.raises(SweepError, match="configuration 0: TypeError: unknown options"):
+        quiet(partial(EKF, bump=1.0), priors(), BASE.z, MODEL)
