@@ -24,10 +24,10 @@ $(BUILT): $(SOURCES) $(VENV)/.book
 
 test: lint coverage nbval pages  ## everything: lint, types, unit tests, notebooks, rendered pages
 
-unit: $(VENV)/.test  ## unit and property tests alone, under a minute
-	$(BIN)/pytest tests --ignore tests/book -n 2
+unit: $(VENV)/.test  ## unit and property tests alone, without the slow ones, in about a minute
+	$(BIN)/pytest tests --ignore tests/book -n 2 -m "not slow"
 
-coverage: $(VENV)/.test  ## the same with branch coverage
+coverage: $(VENV)/.test  ## all unit tests, with branch coverage
 	$(BIN)/pytest tests --ignore tests/book -n 2 --cov --cov-report=term
 
 lint: $(VENV)/.test  ## ruff over code and notebooks, mypy over the library

@@ -104,6 +104,24 @@ def test_panels_are_a_flat_list():
     plt.close(figure)
 
 
+@pytest.mark.parametrize("log", [False, True])
+def test_maps_show_what_is_above_the_scale_and_what_failed(log):
+    values = np.array([[1e-9, 1e-3, 2.0], [1.0, np.nan, np.inf]])
+    figure, axes = plotting.map_panels(
+        [1, 2, 3], [1, 2], {"one": values, "two": values.T.reshape(2, 3)}, "I", (1e-6, 1), log=log
+    )
+    assert [ax.get_title() for ax in axes] == ["one", "two"]
+    figure.draw_without_rendering()
+    found = [mpl.colors.to_hex(c) for c in axes[0].collections[0].get_facecolors()]
+    black, failed = "#000000", plotting.EKF.lower()
+    assert [c == black for c in found] == [False, False, True, False, False, True]
+    assert [c == failed for c in found] == [False, False, False, False, True, False]
+    grey = [mpl.colors.to_rgb(found[i]) @ np.array([0.3, 0.59, 0.11]) for i in (0, 1, 3)]
+    assert grey[0] > grey[1] > grey[2] > 0.1
+    assert axes[1].get_xscale() == ("log" if log else "linear")
+    plt.close(figure)
+
+
 def test_coastlines_of_a_window():
     """Galveston stands on the coast, and every coast has a point on each side that it must."""
     coasts = plotting.coastlines(-98, -92, 27, 31)

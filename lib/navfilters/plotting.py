@@ -12,6 +12,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.patches import Rectangle
 
 EKF, SECOND_ORDER, UKF, MEASUREMENT = "#D55E00", "#009E73", "#0072B2", "#E69F00"
@@ -318,6 +319,61 @@ def sweep_panels(
     for ax in axes:
         label_ends(ax)
     return figure, axes
+
+
+def map_panels(
+    x: Any,
+    y: Any,
+    results: Mapping[str, Any],
+    label: str,
+    limits: tuple[float, float],
+    *,
+    log: bool = False,
+) -> tuple[Any, Sequence[Axes]]:
+    """Small maps on one logarithmic scale of colour, light where a value is small.
+
+    What is above the scale is black, what is NaN vermilion, so that both stand out in grey too.
+
+    Parameters
+    ----------
+    x, y : array-like (columns,), (rows,)
+        Of the maps' points.
+    results : mapping of str to array (rows, columns)
+    label : str
+        Of the colour bar.
+    limits : tuple of float
+        Of the scale.
+    log : bool
+        Whether both axes are logarithmic; otherwise they are equal.
+
+    Returns
+    -------
+    tuple of Figure, list of Axes
+    """
+    shades = plt.get_cmap("viridis_r")(np.linspace(0.0, 0.85, 256))
+    colours = ListedColormap(shades).with_extremes(over="black", bad=EKF)
+    columns, rows = 4, -(-(len(results) + 1) // 4)
+    figure, axes = panels(
+        rows, columns, figsize=(7.4, 0.35 + 1.85 * rows), sharex=True, sharey=True
+    )
+    for ax, (name, values) in zip(axes, results.items(), strict=False):
+        values = np.clip(np.asarray(values, float), limits[0], 1e300)
+        mesh = ax.pcolormesh(x, y, values, cmap=colours, norm=LogNorm(*limits), rasterized=True)
+        ax.set_title(name, fontsize=9)
+        ax.grid(False)
+        ax.tick_params(labelsize=8, labelbottom=True)
+        if log:
+            ax.set(xscale="log", yscale="log")
+        else:
+            ax.set_aspect("equal")
+    free = axes[len(results) :]
+    for ax in free:
+        ax.axis("off")
+    room = free[0].inset_axes((0.0, 0.45, float(len(free)), 0.1))
+    room.set_in_layout(False)  # it is wider than the axes that hold it
+    bar = figure.colorbar(mesh, cax=room, orientation="horizontal", extend="max", label=label)
+    bar.ax.tick_params(labelsize=8)
+    return figure, axes[: len(results)]
 
 
 def coastlines(west: float, east: float, south: float, north: float) -> list[np.ndarray]:

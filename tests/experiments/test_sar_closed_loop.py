@@ -21,6 +21,8 @@ from navfilters.multiplicative import MekfState
 from navfilters.sar.echo import Radar
 from navfilters.sar.geolocate import Matcher
 
+pytestmark = pytest.mark.slow
+
 # a quarter of PALSAR's wavelength has a quarter of its sensitivity to velocity
 SMALL = Imaging(
     radar=Radar(wavelength=0.059, pulse_length=4e-6),

@@ -10,6 +10,8 @@ from numpy.testing import assert_allclose
 from navfilters.experiments import sar_trn
 from navfilters.oracles import sar_trn as oracle
 
+pytestmark = pytest.mark.slow
+
 
 def both(case, updates, seed):
     """Errors and covariances of one run by ours and by the oracle, from the same draws."""

@@ -24,6 +24,8 @@ from navfilters.experiments.xiong2009 import (
 from navfilters.models.orbit import EARTH, Orbit, perigee_apogee
 from navfilters.robust import AdaptiveRobustEKF, ExtendedKalman
 
+pytestmark = pytest.mark.slow
+
 SHORT = Setup(duration=2000, window=500, burns=((700, 900),), thrust=0.45)
 
 

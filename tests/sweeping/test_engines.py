@@ -15,6 +15,8 @@ from navfilters.models import RangeBearing
 from navfilters.robust import RobustEKF
 from navfilters.sweeping import compiled
 
+pytestmark = pytest.mark.slow
+
 BASE = Setup()
 MODEL = BASE.model
 quiet = partial(sweep, progress=False)

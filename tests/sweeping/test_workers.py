@@ -16,6 +16,8 @@ from numpy.testing import assert_array_equal
 from navfilters import FILTERS, Gaussian, SweepError, sweep
 from navfilters.experiments.perea2007 import Setup
 
+pytestmark = pytest.mark.slow
+
 BASE = Setup()
 EKF = FILTERS["EKF"]
 quiet = partial(sweep, z=BASE.z, model=BASE.model, steps=4, progress=False)
@@ -149,6 +151,7 @@ def test_ctrl_c_says_what_was_finished(stored, tmp_path):
 LONG = """
 import sys, numpy as np
 from test_workers import BASE, EKF, priors, sweep
+
 if __name__ == "__main__":
     sweep(EKF, priors(4000), BASE.z, BASE.model, 4000, chunk=20, workers=2, checkpoint=sys.argv[1])
 """
