@@ -133,15 +133,15 @@ class SigmaPoints:
             if name == "alpha" and (value <= 0).any():
                 raise ValueError(f"alpha must be positive; found {value.min()}")
 
-    def weights(self, n: int, xp: Any = np) -> tuple[Array, Array, Array, Array]:
+    def weights(self, n: int, xp: Any = None) -> tuple[Array, Array, Array, Array]:
         """Scaling and weights for a state of size n.
 
         Parameters
         ----------
         n : int
             Size of the state.
-        xp : array namespace
-            Of the results.
+        xp : array namespace, optional
+            Of the results; NumPy by default.
 
         Returns
         -------
@@ -149,6 +149,7 @@ class SigmaPoints:
             (gamma, W0_m, W0_c, W_i): the scale of the offsets, the central point's weight in means
             and in covariances, and the weight of each of the 2 n other points.
         """
+        xp = np if xp is None else xp
         given = 3.0 - n if self.kappa is None else self.kappa
         known = isinstance(given, int | float | list | tuple | np.ndarray)  # not so while compiling
         if known and np.any(n + np.asarray(given) <= 0):
