@@ -341,16 +341,6 @@ def test_the_table_stands_beside_the_papers(capsys, monkeypatch):
     assert "\r1/72" in err
 
 
-def test_tqdm_is_used_where_it_is_installed(monkeypatch):
-    class Tqdm:
-        @staticmethod
-        def tqdm(updates, leave):
-            return list(updates)
-
-    monkeypatch.setitem(sys.modules, "tqdm", Tqdm)
-    assert sar_trn.progress_bar(range(3)) == [0, 1, 2]
-
-
 def test_the_module_runs_as_a_command():
     command = [sys.executable, "-m", "navfilters.experiments.sar_trn", "--runs", "1"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -217,16 +217,6 @@ def test_the_table_stands_beside_the_papers(short, capsys, monkeypatch):
     assert "sigma_p" in out.splitlines()[1]
 
 
-def test_tqdm_is_used_where_it_is_installed(monkeypatch):
-    class Tqdm:
-        @staticmethod
-        def tqdm(updates, leave):
-            return list(updates)
-
-    monkeypatch.setitem(sys.modules, "tqdm", Tqdm)
-    assert xiong2009.progress_bar(range(3)) == [0, 1, 2]
-
-
 def test_the_module_runs_as_a_command():
     command = [sys.executable, "-m", "navfilters.experiments.xiong2009", "--seeds", "0"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

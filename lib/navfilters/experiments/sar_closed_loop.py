@@ -11,7 +11,6 @@ the boresight's true hit on the terrain, by construction: processing to zero Dop
 measure where along the track the antenna points.
 """
 
-import argparse
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -31,6 +30,7 @@ from navfilters.experiments.sar_trn import (
     Setup,
     monte_carlo,
     noise,
+    parsed,
     truth,
 )
 from navfilters.frames import ecef_to_geodetic, ellipsoid_intersection, geodetic_to_ecef
@@ -646,15 +646,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arguments : sequence of str, optional
         Those of the command line by default.
     """
-    parser = argparse.ArgumentParser(description="Closed-loop Monte Carlo of Pogorelsky et al.")
-    parser.add_argument("--case", choices=sorted(CASES), default="TC-1", help="test case")
-    parser.add_argument("--runs", type=int, default=100, help="number of runs")
-    parser.add_argument("--seed", type=int, default=0, help="seed of all runs")
-    chosen = parser.parse_args(arguments)
-    if chosen.runs < 2 or chosen.seed < 0:
-        parser.error(
-            f"--runs must be at least 2 and --seed at least 0; found {chosen.runs}, {chosen.seed}"
-        )
+    chosen = parsed("Closed-loop Monte Carlo of Pogorelsky et al.", arguments)
     text = table(chosen.case, chosen.runs, chosen.seed, progress=progress_bar)
     sys.stdout.write(f"{chosen.case}, {chosen.runs} runs, 1-sigma position at 25 s\n{text}\n")
 

@@ -611,15 +611,23 @@ def table(case: str = "TC-1", runs: int = 100, seed: int = 0, progress: Callable
     return "\n".join(lines)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Print the table: ``python -m navfilters.experiments.sar_trn --case TC-1``.
+def parsed(description: str, arguments: Sequence[str] | None) -> argparse.Namespace:
+    """The command line of this experiment and of the closed loop: case, runs and seed.
 
     Parameters
     ----------
+    description : str
+        For the help.
     arguments : sequence of str, optional
         Those of the command line by default.
+
+    Returns
+    -------
+    argparse.Namespace
+        ``case``, ``runs`` of at least 2 and ``seed`` of at least 0; anything else ends the program
+        with a message.
     """
-    parser = argparse.ArgumentParser(description="Open-loop Monte Carlo of Pogorelsky et al.")
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--case", choices=sorted(CASES), default="TC-1", help="test case")
     parser.add_argument("--runs", type=int, default=100, help="number of runs")
     parser.add_argument("--seed", type=int, default=0, help="seed of all runs")
@@ -628,6 +636,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
         parser.error(
             f"--runs must be at least 2 and --seed at least 0; found {chosen.runs}, {chosen.seed}"
         )
+    return chosen
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the table: ``python -m navfilters.experiments.sar_trn --case TC-1``.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Those of the command line by default.
+    """
+    chosen = parsed("Open-loop Monte Carlo of Pogorelsky et al.", arguments)
     text = table(chosen.case, chosen.runs, chosen.seed, progress_bar)
     sys.stdout.write(f"{chosen.case}, {chosen.runs} runs, 1-sigma position at 600 s\n{text}\n")
 
