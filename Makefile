@@ -6,10 +6,10 @@ BIN := $(VENV)/bin
 BUILT := _build/.complete
 BENCH := .venv-bench
 SOURCES := $(shell find book lib -type f -not -path '*/__pycache__/*' -not -name '.*' 2>/dev/null) \
-	_config.yml _toc.yml requirements.txt
+	_config.yml _toc.yml requirements.txt tools/execute_notebooks.py
 
 .DEFAULT_GOAL := help
-.PHONY: help book test unit coverage lint notebooks nbval pages screens bench lock clean
+.PHONY: help book test unit coverage lint notebooks nbval pages screens bench campaign lock clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1  /p' $(MAKEFILE_LIST) | awk '{printf "  make %-10s", $$1; $$1 = ""; print}'
@@ -19,6 +19,7 @@ book: $(BUILT)  ## execute every notebook and build the HTML; warnings are error
 
 $(BUILT): $(SOURCES) $(VENV)/.book
 	rm -rf _build
+	$(BIN)/python tools/execute_notebooks.py
 	$(BIN)/jupyter-book build . --warningiserror --nitpick --keep-going
 	@touch $@
 
@@ -51,6 +52,9 @@ screens: $(VENV)/.test $(BUILT)  ## every page as a picture: wide and 390 px, li
 bench: $(BENCH)/.ready  ## measure beside the peers and a C loop; store the results in benchmarks/
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/run.py
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/batches.py
+
+campaign: $(VENV)/.book  ## the closed loop at the paper's size; stopped, it goes on where it was
+	$(BIN)/python -m navfilters.experiments.sar_campaign --folder campaign
 
 lock:  ## refresh the three requirements.txt from their .in lists
 	$(PYTHON) -m venv _build/lock

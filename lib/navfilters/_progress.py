@@ -2,31 +2,64 @@
 
 import importlib
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 
 
-def progress(updates: Iterable) -> Iterable:
-    """tqdm's bar where it is installed, a counter otherwise; both on stderr.
+def progress(updates: Iterable) -> Iterator:
+    """An iterable, reported on as it is used.
 
     Parameters
     ----------
     updates : iterable
-        Of known length.
+        Of finite length.
 
     Returns
     -------
-    iterable
-        The same, reported on as it is used.
+    iterator
+        The same.
+    """
+    updates = list(updates)
+    with bar(len(updates)) as done:
+        for update in updates:
+            yield update
+            done(1)
+
+
+@contextmanager
+def bar(total: int) -> Iterator[Callable[[int], None]]:
+    """tqdm's bar with the time left where it is installed, a counter otherwise; both on stderr.
+
+    Parameters
+    ----------
+    total : int
+        Units of work.
+
+    Yields
+    ------
+    callable
+        To be told how many units more are done.
     """
     try:
-        bar = importlib.import_module("tqdm").tqdm
+        tqdm = importlib.import_module("tqdm").tqdm
     except ImportError:
-        return _counted(list(updates))
-    return bar(updates, leave=False)
+        with _counter(total) as done:
+            yield done
+    else:
+        with tqdm(total=total, leave=False, smoothing=0.1) as shown:
+            yield shown.update
 
 
-def _counted(updates: list) -> Iterable:
-    for i, update in enumerate(updates, start=1):
-        sys.stderr.write(f"\r{i}/{len(updates)}" if i < len(updates) else "\r\033[K")
+@contextmanager
+def _counter(total: int) -> Iterator[Callable[[int], None]]:
+    reached = 0
+
+    def done(units: int) -> None:
+        nonlocal reached
+        reached += units
+        sys.stderr.write(f"\r{reached}/{total}")
         sys.stderr.flush()
-        yield update
+
+    yield done
+    sys.stderr.write("\r\033[K")
+    sys.stderr.flush()

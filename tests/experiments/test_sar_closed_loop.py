@@ -5,33 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from small_images import SMALL
 
 from navfilters.experiments import sar_closed_loop
-from navfilters.experiments.sar_closed_loop import (
-    Images,
-    Imaging,
-    acquire,
-    measure_directly,
-    monte_carlo_closed,
-    tabulate,
-)
+from navfilters.experiments.sar_closed_loop import Images, monte_carlo_closed
+from navfilters.experiments.sar_images import Imaging, acquire, measure_directly, tabulate
 from navfilters.experiments.sar_trn import CASES, Setup, monte_carlo, noise, truth
 from navfilters.models.sar_geometry import Measurement
 from navfilters.multiplicative import MekfState
-from navfilters.sar.echo import Radar
 from navfilters.sar.geolocate import Matcher
 
 pytestmark = pytest.mark.slow
-
-# a quarter of PALSAR's wavelength has a quarter of its sensitivity to velocity
-SMALL = Imaging(
-    radar=Radar(wavelength=0.059, pulse_length=4e-6),
-    lines=768,
-    samples=256,
-    half_width=1600.0,
-    steps=(16.0, 4.0),
-    reach=40.0,
-)
 
 
 @pytest.fixture(scope="module")
@@ -91,22 +75,22 @@ def test_a_climb_that_leaves_the_table_is_no_measurement():
     assert_array_equal(images.log[0].absent, [False, True])
 
 
-def test_images_that_never_match_leave_the_prediction(monkeypatch):
+def test_images_that_never_match_leave_the_prediction():
     """The campaign goes on, as dead reckoning does."""
 
     def blind(setup, k, imaging):
         table = tabulate(setup, k, imaging)
         return table._replace(r_f=np.full_like(table.r_f, np.nan))
 
-    monkeypatch.setattr(sar_closed_loop, "tabulate", blind)
-    result = monte_carlo_closed("TC-1", 3, imaging=SMALL)
+    setup = replace(CASES["TC-1"], walk=False)
+    result = monte_carlo(setup, 3, 3, measure=Images(setup, 3, 0, SMALL, tables=blind))
     assert np.isnan(result.innovations).all()
     assert np.isfinite(result.errors).all()
 
     def nothing(k, state):
         return Measurement(np.full((3, 3), np.nan), np.full(3, np.nan), np.full(3, np.nan))
 
-    none = monte_carlo(replace(CASES["TC-1"], walk=False), 3, 3, measure=nothing)
+    none = monte_carlo(setup, 3, 3, measure=nothing)
     assert_array_equal(result.errors, none.errors)
 
 

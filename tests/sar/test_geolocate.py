@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters.experiments.sar_closed_loop import Imaging, _locate, acquire
+from navfilters.experiments.sar_images import Imaging, _locate, acquire
 from navfilters.frames import ecef_to_geodetic
 from navfilters.sar.focus import GroundImage, to_ground
 from navfilters.sar.geolocate import (

@@ -1,6 +1,7 @@
 """Pogorelsky et al. (2020): navigation by SAR images of known terrain, simulated open-loop."""
 
 import argparse
+import importlib
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -480,6 +481,7 @@ def monte_carlo(
     runs: int | Sequence[int] = 100,
     seed: int = 0,
     *,
+    flight: Truth | None = None,
     measure: Callable[[int, MekfState], Measurement] | None = None,
     update: Callable[..., MekfUpdate] = mekf_update,
     progress: Callable[[Iterable], Iterable] = iter,
@@ -499,6 +501,9 @@ def monte_carlo(
     runs : int or sequence of int
         How many, or which: see ``noise``.
     seed : int
+    flight : Truth, optional
+        Another than that of the set-up, which is the default: of as many intervals, at least
+        ``updates``, as it is to last.
     measure : callable, optional
         (k, predicted state) -> Measurement of update k, from 1; by default ``SimulatedImages``. A
         NaN in it is an image that was not matched.
@@ -514,16 +519,21 @@ def monte_carlo(
     Raises
     ------
     ValueError
-        An unknown case, bad counts, or a set-up whose beam leaves the Earth.
+        An unknown case, bad counts, a flight of fewer intervals than updates, or a set-up whose
+        beam leaves the Earth.
 
     References
     ----------
     pogorelsky2020, Figs. 8 to 11.
     """
-    setup = _case(case)
+    setup = of_case(case)
     _whole("updates", updates, 1)
-    intervals = max(updates, setup.shortest)
-    flight, drawn = truth(setup, intervals), noise(runs, intervals, seed)
+    if flight is None:
+        flight = truth(setup, max(updates, setup.shortest))
+    intervals = len(flight.times) - 1
+    if intervals < updates:
+        raise ValueError(f"flight must last {updates} intervals, one an update; found {intervals}")
+    drawn = noise(runs, intervals, seed)
     q_true = misalignment(setup, drawn.walk)
     measure = SimulatedImages(setup, flight, q_true, drawn) if measure is None else measure
     state = _first_estimate(setup, flight.x[0], q_true[:, 0], drawn.first)
@@ -570,7 +580,22 @@ def _error(x: Array, q_mu: Array, state: MekfState) -> Array:
     return np.concatenate([x[:3] - state.r, x[3:] - state.v, turned], axis=-1)
 
 
-def _case(case: Any) -> Setup:
+def of_case(case: Any) -> Setup:
+    """The set-up of a test case.
+
+    Parameters
+    ----------
+    case : {"TC-1", "TC-2"} or Setup
+
+    Returns
+    -------
+    Setup
+
+    Raises
+    ------
+    ValueError
+        An unknown case.
+    """
     if isinstance(case, Setup):
         return case
     if not isinstance(case, str) or case not in CASES:
@@ -594,7 +619,8 @@ def table(case: str = "TC-1", runs: int = 100, seed: int = 0, progress: Callable
     -------
     str
     """
-    result, first = monte_carlo(case, runs=runs, seed=seed, progress=progress), _case(case).sigma_r
+    result = monte_carlo(case, runs=runs, seed=seed, progress=progress)
+    first = of_case(case).sigma_r
     spread = sample_deviation(result.errors[:, -1], result.covariances[:, -1])
     total = mean_nees(result.errors[:, -1], result.covariances[:, -1])
     lines = [f"{'':6}{'predicted':>11}{'sample (95 %)':>25}{'fell by':>10}{'paper':>18}"]
@@ -612,7 +638,7 @@ def table(case: str = "TC-1", runs: int = 100, seed: int = 0, progress: Callable
 
 
 def parsed(description: str, arguments: Sequence[str] | None) -> argparse.Namespace:
-    """The command line of this experiment and of the closed loop: case, runs and seed.
+    """The command line of a Monte Carlo experiment: case, runs and seed.
 
     Parameters
     ----------
@@ -627,29 +653,119 @@ def parsed(description: str, arguments: Sequence[str] | None) -> argparse.Namesp
         ``case``, ``runs`` of at least 2 and ``seed`` of at least 0; anything else ends the program
         with a message.
     """
+    parser = _parser(description)
+    chosen = parser.parse_args(arguments)
+    _counted(parser, chosen, least=2, runs=100)
+    return chosen
+
+
+def _parser(description: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--case", choices=sorted(CASES), default="TC-1", help="test case")
-    parser.add_argument("--runs", type=int, default=100, help="number of runs")
+    parser.add_argument("--runs", type=int, help="number of runs; 100 by default")
     parser.add_argument("--seed", type=int, default=0, help="seed of all runs")
-    chosen = parser.parse_args(arguments)
-    if chosen.runs < 2 or chosen.seed < 0:
+    return parser
+
+
+def _add_product(parser: argparse.ArgumentParser) -> None:
+    """What says where the product is and how to read it; None where it is not given."""
+    group = parser.add_argument_group("the closed loop on an ALOS PALSAR level-1.0 product")
+    group.add_argument(
+        "--palsar", metavar="FOLDER", help="with IMG-... and LED-...; 1 run by default"
+    )
+    group.add_argument("--dem", metavar="FILE", help="GeoTIFF of heights, m")
+    group.add_argument(
+        "--reference", metavar="FILE", help="GeoTIFF of a geocoded, terrain-corrected SAR image"
+    )
+    group.add_argument(
+        "--geoid",
+        metavar="METRES",
+        type=float,
+        help="added to the heights (0 by default). Positions are reckoned above the WGS-84 "
+        "ellipsoid; most elevation models count from sea level, which lies up to 107 m below and "
+        "86 m above it: an error of that size in height is one of the same order in position",
+    )
+    group.add_argument("--polarisation", choices=["HH", "HV", "VH", "VV"], help="which of several")
+    group.add_argument(
+        "--records",
+        metavar=("FIRST", "LAST"),
+        type=int,
+        nargs=2,
+        help="only these signal records, from 0, half-open: where the pulse rate changes",
+    )
+    group.add_argument(
+        "--clock-offset", metavar="SECONDS", type=float, help="added to the times of the lines"
+    )
+
+
+def _counted(
+    parser: argparse.ArgumentParser, chosen: argparse.Namespace, least: int, runs: int
+) -> None:
+    """End the program unless runs, by default so many, and seed are large enough."""
+    chosen.runs = runs if chosen.runs is None else chosen.runs
+    if chosen.runs < least or chosen.seed < 0:
         parser.error(
-            f"--runs must be at least 2 and --seed at least 0; found {chosen.runs}, {chosen.seed}"
+            f"--runs must be at least {least} and --seed at least 0; found {chosen.runs}, "
+            f"{chosen.seed}"
         )
-    return chosen
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table: ``python -m navfilters.experiments.sar_trn --case TC-1``.
+
+    With ``--closed-loop`` this is the command of ``navfilters.experiments.sar_closed_loop``; with
+    ``--closed-loop --palsar FOLDER --dem FILE --reference FILE`` that loop runs on a PALSAR
+    product: see ``navfilters.experiments.palsar_loop``.
 
     Parameters
     ----------
     arguments : sequence of str, optional
         Those of the command line by default.
     """
-    chosen = parsed("Open-loop Monte Carlo of Pogorelsky et al.", arguments)
+    parser = _parser("Monte Carlo of Pogorelsky et al.: open-loop, closed-loop, or on real data.")
+    parser.add_argument(
+        "--closed-loop", action="store_true", help="form and match images instead of drawing errors"
+    )
+    _add_product(parser)
+    chosen = parser.parse_args(arguments)
+    options = ("dem", "reference", "geoid", "polarisation", "records", "clock_offset")
+    given = [name for name in options if getattr(chosen, name) is not None]
+    if chosen.palsar is None and given:
+        parser.error(f"--{given[0].replace('_', '-')} must come with --palsar")
+    if chosen.palsar is not None:
+        needed = ("closed_loop", "dem", "reference")
+        if absent := [name.replace("_", "-") for name in needed if not getattr(chosen, name)]:
+            parser.error(f"--palsar must come with --{', --'.join(absent)}")
+        _counted(parser, chosen, least=1, runs=1)
+        sys.stdout.write(f"{_on_product(chosen)}\n")
+        return
+    _counted(parser, chosen, least=2, runs=100)
+    if chosen.closed_loop:
+        closed = importlib.import_module("navfilters.experiments.sar_closed_loop")
+        closed.main([f"--{name}={getattr(chosen, name)}" for name in ("case", "runs", "seed")])
+        return
     text = table(chosen.case, chosen.runs, chosen.seed, progress_bar)
     sys.stdout.write(f"{chosen.case}, {chosen.runs} runs, 1-sigma position at 600 s\n{text}\n")
+
+
+def _on_product(chosen: argparse.Namespace) -> str:
+    """The table of a product; what is wrong with its files ends the program with a message."""
+    try:
+        return importlib.import_module("navfilters.experiments.palsar_loop").report(
+            chosen.palsar,
+            chosen.dem,
+            chosen.reference,
+            chosen.case,
+            chosen.runs,
+            chosen.seed,
+            geoid=chosen.geoid or 0.0,
+            polarisation=chosen.polarisation,
+            records=chosen.records,
+            clock_offset=chosen.clock_offset or 0.0,
+            progress=progress_bar,
+        )
+    except (ValueError, OSError, ImportError) as error:
+        sys.exit(f"{error}")
 
 
 if __name__ == "__main__":

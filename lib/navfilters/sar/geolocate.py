@@ -2,8 +2,9 @@
 
 OpenCV detects and matches features (SIFT; the paper has SURF, which its packages lack) and fits an
 affine transformation by RANSAC. The reference is another radar image: seen by another pass under
-another angle, with other speckle, projected like the image onto ground of one height. Each of its
-pixels knows its latitude and longitude on the true terrain.
+another angle, with other speckle, projected like the image onto ground of one height; or an
+orthoimage, whose pixels stand where the ground is. Each of its pixels knows its latitude and
+longitude on the true terrain.
 """
 
 import importlib
@@ -189,8 +190,8 @@ class Reference:
         m, on the scene's map.
     scene : Scene
         Whose map and elevation model the onboard computer has.
-    view : View
-        From where the reference was taken.
+    view : View or None
+        From where the reference was taken; None for an orthoimage, in which no terrain leans.
     matcher : Matcher
 
     Attributes
@@ -204,7 +205,7 @@ class Reference:
     values: Array
     pixel: float
     scene: Scene
-    view: View
+    view: View | None
     matcher: Matcher = MATCHER
     features: Features = field(init=False, repr=False)
     on_terrain: Array = field(init=False, repr=False)
@@ -231,8 +232,8 @@ class Reference:
         Notes
         -----
         Terrain is shifted towards the radar by what it is higher than the middle, over the tangent
-        of the incidence. The shift is undone by iteration, which converges where no slope is steep
-        enough to be laid over.
+        of the incidence; not in an orthoimage. The shift is undone by iteration, which converges
+        where no slope is steep enough to be laid over.
         """
         x, y, height = self._terrain(column, row)
         return *self.scene.map.geodetic(x, y), height + self.scene.height(0.0, 0.0)
@@ -268,7 +269,10 @@ class Reference:
     def _terrain(self, column: Any, row: Any) -> tuple[Array, Array, Array]:
         """East, north and height above the middle of what pixels show, m."""
         east, north = self._position(column, row)
-        away, level = self.view.axes[1], self.scene.height(0.0, 0.0)
+        level = self.scene.height(0.0, 0.0)
+        if self.view is None:
+            return east, north, self.scene.height(east, north) - level
+        away = self.view.axes[1]
         x, y, height = east, north, np.zeros_like(east)
         for _ in range(20):
             height = self.scene.height(x, y) - level

@@ -1,16 +1,14 @@
 """Finished chunks in a folder, so that a sweep that stops can go on."""
 
 import hashlib
-import io
-import os
 import pickle
-import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import navfilters
+from navfilters import _stored
 from navfilters.sweeping.chunks import Job, Kept
 from navfilters.sweeping.trees import Leaf, Tree, flatten, unflatten
 
@@ -48,11 +46,8 @@ class Checkpoint:
     def save(self, number: int, kept: Kept) -> None:
         """Store a chunk, whole or not at all."""
         _, leaves = flatten("kept", kept, None)
-        content = io.BytesIO()
-        np.savez(content, np.array(self.job), *(leaf.array for leaf in leaves))
-        unfinished = self.path(number).with_suffix(".part")
-        unfinished.write_bytes(content.getvalue())
-        os.replace(unfinished, self.path(number))
+        arrays = {f"leaf{i}": leaf.array for i, leaf in enumerate(leaves)}
+        _stored.save(self.path(number), self.job, **arrays)
 
     def load(self, number: int) -> Kept | None:
         """A stored chunk; None if there is none.
@@ -70,28 +65,14 @@ class Checkpoint:
         ValueError
             The file is damaged, or another job's; naming it.
         """
-        path = self.path(number)
-        if not path.exists():
-            return None
-        try:
-            with zipfile.ZipFile(path) as archive:
-                damaged = archive.testzip()
-            if damaged:
-                raise zipfile.BadZipFile(f"bad checksum of {damaged}")
-            with np.load(path, allow_pickle=False) as file:
-                ours = str(file["arr_0"]) == self.job
-                arrays = [file[f"arr_{i + 1}"] for i in range(self.result.size) if ours]
-        except Exception as error:  # zipfile and NumPy raise nearly anything
-            raise ValueError(
-                f"checkpoint file {path} is damaged ({type(error).__name__}: {error}); delete it, "
-                "and its configurations are computed again"
-            ) from error
-        if not ours:
-            raise ValueError(
-                f"checkpoint file {path} belongs to another sweep: other arguments, chunk size or "
-                "version; use another folder for this one"
-            )
-        return unflatten(self.result, arrays)
+        arrays = _stored.load(
+            self.path(number),
+            self.job,
+            [f"leaf{i}" for i in range(self.result.size)],
+            kind="sweep or chunk size",
+            remedy="its configurations are computed again",
+        )
+        return None if arrays is None else unflatten(self.result, arrays)
 
 
 def _fingerprint(job: Job, leaves: list[Leaf], size: int) -> str:
