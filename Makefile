@@ -49,9 +49,10 @@ notebooks: $(VENV)/.test  ## execute every notebook in place and refresh its sto
 screens: $(VENV)/.test $(BUILT)  ## every page as a picture: wide and 390 px, light and dark
 	$(BIN)/python tools/screens.py _build/html _build/screens
 
-bench: $(BENCH)/.ready  ## measure beside the peers and a C loop; store the results in benchmarks/
+bench: $(BENCH)/.ready $(VENV)/.book  ## measure beside the peers and a C loop; store the results in benchmarks/
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/run.py
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/batches.py
+	env -u OPENBLAS_CORETYPE $(BIN)/python benchmarks/imaging.py
 
 campaign: $(VENV)/.book  ## the closed loop at the paper's size; stopped, it goes on where it was
 	$(BIN)/python -m navfilters.experiments.sar_campaign --folder campaign

@@ -108,8 +108,15 @@ def test_panels_are_a_flat_list():
 def test_maps_show_what_is_above_the_scale_and_what_failed(log):
     values = np.array([[1e-9, 1e-3, 2.0], [1.0, np.nan, np.inf]])
     figure, axes = plotting.map_panels(
-        [1, 2, 3], [1, 2], {"one": values, "two": values.T.reshape(2, 3)}, "I", (1e-6, 1), log=log
+        [1, 2, 3],
+        [1, 2],
+        {"one": values, "two": values.T.reshape(2, 3)},
+        "I",
+        (1e-6, 1),
+        labels=("east", "north"),
+        log=log,
     )
+    assert (figure.get_supxlabel(), figure.get_supylabel()) == ("east", "north")
     assert [ax.get_title() for ax in axes] == ["one", "two"]
     figure.draw_without_rendering()
     found = [mpl.colors.to_hex(c) for c in axes[0].collections[0].get_facecolors()]

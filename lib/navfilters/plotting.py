@@ -328,6 +328,7 @@ def map_panels(
     label: str,
     limits: tuple[float, float],
     *,
+    labels: tuple[str, str],
     log: bool = False,
 ) -> tuple[Any, Sequence[Axes]]:
     """Small maps on one logarithmic scale of colour, light where a value is small.
@@ -343,6 +344,8 @@ def map_panels(
         Of the colour bar.
     limits : tuple of float
         Of the scale.
+    labels : tuple of str
+        Of all horizontal and of all vertical axes.
     log : bool
         Whether both axes are logarithmic; otherwise they are equal.
 
@@ -373,6 +376,8 @@ def map_panels(
     room.set_in_layout(False)  # it is wider than the axes that hold it
     bar = figure.colorbar(mesh, cax=room, orientation="horizontal", extend="max", label=label)
     bar.ax.tick_params(labelsize=8)
+    figure.supxlabel(labels[0], fontsize=9)
+    figure.supylabel(labels[1], fontsize=9)
     return figure, axes[: len(results)]
 
 

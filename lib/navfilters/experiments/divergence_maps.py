@@ -220,6 +220,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.stdout.write(f"{path}\n")
 
 
+AXES = {
+    "starts": ("first estimate, $x_1$ (units)", "first estimate, $x_2$ (units)"),
+    "noises": (
+        "deviation of the first estimate (units)",
+        r"$\sigma_r / \sigma_\theta$ (units per radian)",
+    ),
+}
+"""What the axes of a map of first estimates, and of one of noises, say."""
+
+
 def _draw(found: dict[str, Array], size: int, out: str) -> list[str]:
     """Four pictures: I and its change by the last bit, over the starts and over the noises."""
     import matplotlib.pyplot as plt
@@ -244,8 +254,9 @@ def _draw(found: dict[str, Array], size: int, out: str) -> list[str]:
             ("", I, (1e-6, 1.0), "improvement I"),
             ("-last-bit", change, (1e-15, 1.0), "relative change of I"),
         ):
-            log = label == "noises"
-            figure, axes = plotting.map_panels(x, y, maps, text, limits, log=log)
+            figure, axes = plotting.map_panels(
+                x, y, maps, text, limits, labels=AXES[label], log=label == "noises"
+            )
             for ax in axes:
                 ax.plot(*start, "+", color="black")
             paths.append(f"{out}-{label}{kind}.png")
