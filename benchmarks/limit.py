@@ -1,17 +1,32 @@
-"""The practical limit: limit.c, compiled with -O3 and called through ctypes."""
+"""The practical limit: limit*.c, compiled with -O3 and called through ctypes."""
 
 import ctypes
 import shutil
 import subprocess
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from problems import Coasting, Images
 
 from navfilters import Gaussian
+from navfilters.models.gravity import Gravity
 
-SOURCE = Path(__file__).with_name("limit.c")
+SOURCES = sorted(Path(__file__).parent.glob("limit*.c"))
 FLAGS = ("-O3", "-shared", "-fPIC")
+
+
+class Flight(ctypes.Structure):
+    """The C header's ``flight``."""
+
+    _fields_ = (
+        ("mu", ctypes.c_double),
+        ("k", ctypes.c_double),
+        ("rate", ctypes.c_double),
+        ("step", ctypes.c_double),
+        ("substeps", ctypes.c_long),
+    )
 
 
 def compiler() -> str | None:
@@ -19,7 +34,7 @@ def compiler() -> str | None:
     return shutil.which("cc") or shutil.which("gcc")
 
 
-def compiled(folder: Path) -> dict[str, Callable]:
+def compiled(folder: Path) -> dict[str, Callable[..., Gaussian]]:
     """Compile the C filters.
 
     Parameters
@@ -30,25 +45,52 @@ def compiled(folder: Path) -> dict[str, Callable]:
     Returns
     -------
     dict
-        "EKF" and "UKF": (prior, z, R, steps) -> Gaussian, for mean (members, 2), cov (members,
-        2, 2), z (2,) and R (2, 2).
+        (prior, z, model, steps) -> Gaussian, for mean (members, n) and cov (members, n, n) or
+        (n, n). "EKF" and "UKF": n = 2, z (2,), and the model is R (2, 2). "orbit EKF" and "MEKF": n
+        = 6 and 9, the model is ``Coasting`` or ``Images``, and z as the problem has it.
     """
     library = Path(folder) / "limit.so"
-    command = [compiler() or "cc", *FLAGS, str(SOURCE), "-o", str(library), "-lm"]
+    command = [compiler() or "cc", *FLAGS, *map(str, SOURCES), "-o", str(library), "-lm"]
     subprocess.run(command, check=True)
     loaded = ctypes.CDLL(str(library))
-    array = np.ctypeslib.ndpointer(np.float64, flags="C_CONTIGUOUS")
+    return {
+        "EKF": partial(_static, loaded.ekf),
+        "UKF": partial(_static, loaded.ukf),
+        "orbit EKF": partial(_orbit, loaded.orbit_ekf),
+        "MEKF": partial(_images, loaded.mekf),
+    }
 
-    def wrapped(name: str) -> Callable:
-        function = getattr(loaded, name)
-        function.argtypes = [ctypes.c_long, ctypes.c_long, *(array,) * 4]
-        function.restype = None
 
-        def run(prior: Gaussian, z: np.ndarray, R: np.ndarray, steps: int) -> Gaussian:
-            mean, cov = (np.array(part, float, order="C") for part in prior)
-            function(len(mean), steps, mean, cov, z, R)
-            return Gaussian(mean, cov)
+def _static(function: Callable, prior: Gaussian, z, R, steps: int) -> Gaussian:
+    return _called(function, prior, steps, z, R)
 
-        return run
 
-    return {"EKF": wrapped("ekf"), "UKF": wrapped("ukf")}
+def _orbit(function: Callable, prior: Gaussian, z, model: Coasting, steps: int) -> Gaussian:
+    orbit, sensor = model.orbit, model.sensor
+    flight = _flight(orbit.gravity, 0.0, orbit.step, orbit.substeps)
+    return _called(function, prior, steps, z[:steps], sensor.R, model.Q, sensor.stars, flight)
+
+
+def _images(function: Callable, prior: Gaussian, z, model: Images, steps: int) -> Gaussian:
+    orbit, geometry = model.orbit, model.geometry
+    flight = _flight(orbit.gravity, orbit.rate, orbit.step, model.steps)
+    axes = geometry.T_b_s @ geometry.T_e_b
+    return _called(function, prior, steps, z[:steps], geometry.R, geometry.D, orbit.Q, axes, flight)
+
+
+def _flight(gravity: Gravity, rate: float, step: float, substeps: int) -> Flight:
+    return Flight(gravity.mu, 1.5 * gravity.J2 * gravity.radius**2, rate, step, substeps)
+
+
+def _called(function: Callable, prior: Gaussian, steps: int, *model) -> Gaussian:
+    """Copies of the prior, updated; every other argument is an array or a flight."""
+    mean = np.array(prior.mean, float, order="C")
+    cov = np.broadcast_to(prior.cov, (*mean.shape, mean.shape[-1])).astype(float, order="C")
+    given = [a if isinstance(a, Flight) else np.ascontiguousarray(a, float) for a in model]
+    pointers = [
+        ctypes.byref(a) if isinstance(a, Flight) else ctypes.c_void_p(a.ctypes.data)
+        for a in (mean, cov, *given)
+    ]
+    function.restype = None
+    function(ctypes.c_long(len(mean)), ctypes.c_long(steps), *pointers)
+    return Gaussian(mean, cov)

@@ -12,9 +12,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 from navfilters.linalg import (
     cholesky,
     is_positive_definite,
+    matmul,
+    matrix,
+    outer_sum,
     right_divide,
     spectral_norm,
     symmetric_root,
+    vector,
 )
 
 entries = st.floats(-10, 10).map(lambda value: round(value, 6))  # no subnormal numbers
@@ -61,6 +65,67 @@ def assert_alone(function, healthy, bad, member=2):
     assert_array_equal(got[others], wanted[others])
     assert np.isfinite(wanted).all()
     return got[member]
+
+
+# --- products -----------------------------------------------------------------------------------
+
+
+SHAPES = [(n, k, m) for n in (1, 2, 3) for k in (1, 2, 3) for m in (1, 2, 3)]
+
+
+@pytest.mark.parametrize(("n", "k", "m"), SHAPES)
+def test_matmul_is_the_product(n, k, m):
+    """Batch axes broadcast; two by two and larger."""
+    rng = np.random.default_rng(n + 3 * k + 9 * m)
+    A, B = rng.normal(size=(4, 1, n, k)), rng.normal(size=(5, k, m))
+    got = matmul(A, B)
+    assert got.shape == (4, 5, n, m)
+    assert_allclose(got, A @ B, rtol=0, atol=1e-15 * k * np.abs(A).max() * np.abs(B).max())
+
+
+@pytest.mark.parametrize(("n", "m"), [(n, m) for n in (1, 2, 3) for m in (1, 2, 3)])
+@pytest.mark.parametrize("k", [1, 4])
+def test_outer_sum_is_the_sum_of_outer_products(n, m, k):
+    rng = np.random.default_rng(n + 3 * m)
+    a, b = rng.normal(size=(k, 7, n)), rng.normal(size=(k, 7, m))
+    got = outer_sum(a, b)
+    assert got.shape == (7, n, m)
+    for i in range(7):
+        wanted = sum(np.outer(x, y) for x, y in zip(a[:, i], b[:, i], strict=True))
+        assert_allclose(got[i], wanted, rtol=0, atol=1e-14)
+
+
+def test_a_written_out_product_is_the_same_alone_and_among_others():
+    """To the last bit, in any order of memory, and beside a member that is not finite."""
+    rng = np.random.default_rng(0)
+    A, B = rng.normal(size=(2, 501, 2, 2))
+    a, b = rng.normal(size=(2, 4, 501, 2))
+    products, sums = matmul(A, B), outer_sum(a, b)
+    for i in (0, 250, 500):
+        assert_array_equal(matmul(A[i], B[i]), products[i])
+        assert_array_equal(outer_sum(a[:, i], b[:, i]), sums[i])
+    innermost = [np.moveaxis(np.moveaxis(X, 0, -1).copy(), -1, 0) for X in (A, B)]
+    assert_array_equal(matmul(*innermost), products)
+    A[250, 0, 0] = np.nan
+    assert_array_equal(np.delete(matmul(A, B), 250, 0), np.delete(products, 250, 0))
+
+
+@pytest.mark.parametrize("shape", [(), (7,), (2, 3)])
+def test_vectors_and_matrices_from_their_elements(shape):
+    """Equal to what NumPy stacks; members innermost in memory, and still so after a product."""
+    elements = list(np.random.default_rng(0).normal(size=(6, *shape)))
+    v, M = vector(elements), matrix([elements[:3], elements[3:]])
+    assert_array_equal(v, np.stack(elements, axis=-1))
+    assert_array_equal(M, np.stack(elements, axis=-1).reshape(*shape, 2, 3))
+    square = matrix([elements[:2], elements[2:4]])
+    for array in (
+        v,
+        M,
+        square,
+        matmul(square, square.mT),
+        outer_sum(v[None, ..., :2], v[None, ..., :2]),
+    ):
+        assert len(shape) == 0 or array.strides[len(shape) - 1] == array.itemsize
 
 
 # --- square roots -------------------------------------------------------------------------------

@@ -11,10 +11,11 @@ makes one update for every member of a batch.
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from navfilters.linalg import right_divide, spectral_norm
+from navfilters.linalg import matmul, right_divide, spectral_norm
 from navfilters.moments import linearized, second_order, unscented
 from navfilters.types import Array, Gaussian, MeasurementModel, Moments
 
@@ -50,8 +51,8 @@ def kalman_update(prior: Gaussian, z: Array, moments: Moments) -> Gaussian:
     perea2007, Eqs. (5)-(7).
     """
     K = right_divide(moments.P_xz, moments.P_zz)
-    mean = prior.mean + (K @ (z - moments.z_hat)[..., None])[..., 0]
-    reduction = K @ moments.P_xz.mT
+    mean = prior.mean + matmul(K, (z - moments.z_hat)[..., None])[..., 0]
+    reduction = matmul(K, moments.P_xz.mT)
     return Gaussian(mean, prior.cov - (reduction + reduction.mT) / 2)
 
 
@@ -98,7 +99,7 @@ def bump_linear(prior: Gaussian, model: MeasurementModel, moments: Moments, *, b
     ----------
     perea2007, Eqs. (13), (14) and, for the second-order filter, section V.A.
     """
-    spread = model.jacobian(prior.mean) @ moments.P_xz
+    spread = matmul(model.jacobian(prior.mean), moments.P_xz)
     return prior, _add_noise(moments, _per_member(spread, bump) * spread)
 
 
@@ -152,7 +153,7 @@ def bump_circular(prior: Gaussian, model: MeasurementModel, moments: Moments):
     perea2007, Eq. (15) (B-EKF 2); the norm is the spectral one.
     """
     H = model.jacobian(prior.mean)
-    return prior, _add_noise(moments, spectral_norm(prior.cov)[..., None, None] * (H @ H.mT))
+    return prior, _add_noise(moments, spectral_norm(prior.cov)[..., None, None] * matmul(H, H.mT))
 
 
 def bump_equivalent(prior: Gaussian, model: MeasurementModel, moments: Moments):
@@ -187,7 +188,7 @@ def bump_equivalent(prior: Gaussian, model: MeasurementModel, moments: Moments):
         )
     J_R = right_divide(model.R, H.mT).mT  # H^-1 R, R being symmetric
     in_state_space = right_divide(J_R, H.mT)
-    R_new = spectral_norm(in_state_space)[..., None, None] * (H @ H.mT)
+    R_new = spectral_norm(in_state_space)[..., None, None] * matmul(H, H.mT)
     return prior, _add_noise(moments, R_new - model.R)
 
 
@@ -214,7 +215,7 @@ def bump_state(prior: Gaussian, model: MeasurementModel, moments: Moments):
     xp = H.__array_namespace__()
     size = spectral_norm(prior.cov)[..., None, None]
     P_new = size * xp.eye(H.shape[-1])
-    moments = Moments(moments.z_hat, model.R + size * (H @ H.mT), size * H.mT)
+    moments = Moments(moments.z_hat, model.R + size * matmul(H, H.mT), size * H.mT)
     return Gaussian(prior.mean, P_new), moments
 
 
@@ -354,6 +355,7 @@ class Filter:
         return Gaussian(prior.mean + (cov @ weight @ residual[..., None])[..., 0], cov)
 
 
+@lru_cache  # a signature costs as much as half an update of one member
 def _keywords(function: Callable) -> tuple[str, ...]:
     parameters = inspect.signature(function).parameters.values()
     return tuple(p.name for p in parameters if p.default is not p.empty)

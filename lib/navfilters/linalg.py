@@ -2,10 +2,95 @@
 
 Measurement-sized problems are written out, element by element over the batch axes: one LAPACK call
 per matrix costs ten to thirty times the arithmetic, and raises for the whole stack when one member
-fails. Here the member that fails becomes NaN, alone.
+fails. Here the member that fails becomes NaN, alone. What is put together from its elements has the
+members *innermost in memory*, a[..., i] in one piece: NumPy keeps that order from one operation to
+the next, and works through the members of a 2 x 2 problem three to five times as fast.
 """
 
 from navfilters.types import Array
+
+WRITTEN_OUT = 2
+"""Largest size of the matrices whose products are written out; above, BLAS is as fast."""
+
+
+def matmul(A: Array, B: Array) -> Array:
+    """A B, for each pair of a stack.
+
+    Parameters
+    ----------
+    A : array (..., n, k)
+    B : array (..., k, m)
+
+    Returns
+    -------
+    array (..., n, m)
+
+    Notes
+    -----
+    Up to 2 x 2 the sum of the products of A's columns and B's rows, so that a member's last bits
+    depend neither on the others nor on their number; larger ones are left to ``@``.
+    """
+    k = A.shape[-1]
+    if max(A.shape[-2], k, B.shape[-1]) > WRITTEN_OUT:
+        return A @ B
+    terms = [A[..., i : i + 1] * B[..., i : i + 1, :] for i in range(k)]
+    return sum(terms[1:], start=terms[0])
+
+
+def outer_sum(a: Array, b: Array) -> Array:
+    """sum_i a_i b_i^T, for each pair of two series of stacks of vectors.
+
+    Parameters
+    ----------
+    a : array (k, ..., n)
+    b : array (k, ..., m)
+
+    Returns
+    -------
+    array (..., n, m)
+
+    Notes
+    -----
+    Up to 2 x 2 written out, as in :func:`matmul`.
+    """
+    if max(a.shape[-1], b.shape[-1]) > WRITTEN_OUT:
+        xp = a.__array_namespace__()
+        return xp.moveaxis(a, 0, -1) @ xp.moveaxis(b, 0, -2)
+    terms = [x[..., :, None] * y[..., None, :] for x, y in zip(a, b, strict=True)]
+    return sum(terms[1:], start=terms[0])
+
+
+def vector(elements: list[Array]) -> Array:
+    """A vector over the batch axes, from its elements.
+
+    Parameters
+    ----------
+    elements : list of array (...)
+
+    Returns
+    -------
+    array (..., n)
+        With the members innermost in memory.
+    """
+    xp = elements[0].__array_namespace__()
+    v = xp.stack(elements)
+    return xp.permute_dims(v, (*range(1, v.ndim), 0))
+
+
+def matrix(rows: list[list[Array]]) -> Array:
+    """A matrix over the batch axes, from the rows of its elements.
+
+    Parameters
+    ----------
+    rows : list of list of array (...)
+
+    Returns
+    -------
+    array (..., n, m)
+        With the members innermost in memory.
+    """
+    v = vector([element for row in rows for element in row])
+    return v.__array_namespace__().reshape(v, (*v.shape[:-1], len(rows), len(rows[0])))
 
 
 def cholesky(A: Array) -> Array:
@@ -29,7 +114,7 @@ def cholesky(A: Array) -> Array:
         L[j][j] = xp.sqrt(xp.where(pivot > 0, pivot, xp.nan))
         for i in range(j + 1, n):
             L[i][j] = (A[..., i, j] - sum(L[i][k] * L[j][k] for k in range(j))) / L[j][j]
-    return _stack(xp, L)
+    return matrix(L)
 
 
 def symmetric_root(A: Array) -> Array:
@@ -83,20 +168,19 @@ def right_divide(B: Array, A: Array) -> Array:
     m = 1 divides, m = 2 uses the adjugate, anything larger Gauss-Jordan elimination with the row of
     the largest pivot, chosen for each member on its own.
     """
-    xp = A.__array_namespace__()
     m = A.shape[-1]
     if m == 1:
         return B / A
     if m == 2:
         a, b, c, d = A[..., 0, 0], A[..., 0, 1], A[..., 1, 0], A[..., 1, 1]
-        adjugate = _stack(xp, [[d, -b], [-c, a]])
-        return (B @ adjugate) / (a * d - b * c)[..., None, None]
-    return _solve(xp, A.mT, B.mT).mT
+        adjugate = matrix([[d, -b], [-c, a]])
+        return matmul(B, adjugate) / (a * d - b * c)[..., None, None]
+    return _solve(A.mT, B.mT).mT
 
 
-def _solve(xp, A: Array, B: Array) -> Array:
+def _solve(A: Array, B: Array) -> Array:
     """A^-1 B for a stack, by Gauss-Jordan elimination with partial pivoting."""
-    m = A.shape[-1]
+    xp, m = A.__array_namespace__(), A.shape[-1]
     batch = xp.broadcast_shapes(A.shape[:-2], B.shape[:-2])
     work = xp.concat([xp.broadcast_to(X, (*batch, *X.shape[-2:])) for X in (A, B)], axis=-1)
     rows = xp.arange(m)
@@ -146,8 +230,3 @@ def is_positive_definite(A: Array) -> Array:
     """
     xp = A.__array_namespace__()
     return xp.all(xp.isfinite(cholesky(A)), axis=(-2, -1))
-
-
-def _stack(xp, rows: list) -> Array:
-    """A matrix over the batch axes from a nested list of its elements."""
-    return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from navfilters import linalg, validation
+from navfilters.linalg import matmul, outer_sum
 from navfilters.types import Array, Gaussian, MeasurementModel, Moments
 
 
@@ -35,8 +36,8 @@ def linearized(prior: Gaussian, model: MeasurementModel) -> Moments:
     perea2007, Eqs. (10)-(12).
     """
     H = model.jacobian(prior.mean)
-    P_xz = prior.cov @ H.mT
-    return Moments(model.h(prior.mean), model.R + H @ P_xz, P_xz)
+    P_xz = matmul(prior.cov, H.mT)
+    return Moments(model.h(prior.mean), model.R + matmul(H, P_xz), P_xz)
 
 
 def second_order(prior: Gaussian, model: MeasurementModel) -> Moments:
@@ -229,9 +230,7 @@ def unscented(
     # The weights sum to one. Summing differences keeps the digits that a large negative W0 would
     # cancel.
     z_hat = Z[0] + W_i[..., None] * xp.sum(Z[1:] - Z[0], axis=0)
-    dZ = xp.moveaxis(Z - z_hat, 0, -1)
-    dX = xp.moveaxis(X[1:] - prior.mean, 0, -1)
-    centre, others = dZ[..., :1], dZ[..., 1:]
+    dX, dZ = X - prior.mean, Z - z_hat
     W0_c, W_i = W0_c[..., None, None], W_i[..., None, None]
-    P_zz = model.R + W0_c * (centre @ centre.mT) + W_i * (others @ others.mT)
-    return Moments(z_hat, P_zz, W_i * (dX @ others.mT))
+    P_zz = model.R + W0_c * outer_sum(dZ[:1], dZ[:1]) + W_i * outer_sum(dZ[1:], dZ[1:])
+    return Moments(z_hat, P_zz, W_i * outer_sum(dX[1:], dZ[1:]))

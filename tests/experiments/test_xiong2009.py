@@ -205,6 +205,53 @@ def test_information_recursion_is_that_of_inverses():
     assert_allclose(cramer_rao_bound(SHORT)[-1], wanted, rtol=1e-5)
 
 
+@pytest.mark.parametrize("thrust", ["known", "unknown"])
+def test_the_bound_is_that_of_a_plain_loop_over_the_seconds(thrust):
+    """At every second, not only at updates; the loop does not look at whole intervals."""
+    flight, sensor = truth(SHORT), SHORT.sensor
+    known = thrust == "known"
+    orbit = SHORT.orbit(flight.thrust) if known else SHORT.orbit()
+    step, a = replace(orbit, substeps=1), flight.thrust.magnitude
+    P = np.zeros((9, 9))
+    P[:6, :6] = SHORT.prior.cov
+    wanted = [P]
+    for t in range(2000):
+        P = P.copy()
+        if t % 100 == 0:
+            P[6:], P[:, 6:] = 0, 0
+            P[6:, 6:] = a**2 * np.eye(3)
+        F = np.eye(9)
+        F[:6, :6] = step.transitions(flight.states[t : t + 2], float(t))[0]
+        if not known and 700 <= t < 900:
+            F[:6, 6:] = np.concatenate([np.eye(3) / 2, np.eye(3)])
+        P = F @ P @ F.T
+        P[:6, :6] += orbit.Q
+        if (t + 1) % 100 == 0:
+            H = np.zeros((2, 9))
+            H[:, :6] = sensor.jacobian(flight.states[t + 1])
+            K = P @ H.T @ np.linalg.inv(H @ P @ H.T + sensor.R)
+            P = P - K @ H @ P
+        wanted.append(P)
+    deviation = np.sqrt(np.diagonal(wanted, axis1=1, axis2=2)[:, :3])
+    assert_allclose(cramer_rao_bound(SHORT, thrust=thrust), deviation, rtol=1e-7)
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_an_interval_is_propagated_once(name, monkeypatch):
+    """Prediction, Jacobian and noise share one path: four slopes for each second."""
+    truth(SHORT)  # flown already, by another integrator
+    slope, calls = Orbit.derivative, []
+
+    def counted(self, *given, **options):
+        calls.append(1)
+        return slope(self, *given, **options)
+
+    monkeypatch.setattr(Orbit, "derivative", counted)
+    estimator = ESTIMATORS[name]
+    errors(estimator.filter, SHORT, range(2), knows_thrust=estimator.knows_thrust)
+    assert len(calls) == 4 * SHORT.duration
+
+
 def test_the_table_stands_beside_the_papers(short, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "tqdm", None)  # as where it is not installed
     xiong2009.main(["--variant", "B", "--seeds", "2"])

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from navfilters.experiments.sar_images import Imaging, acquire
 from navfilters.experiments.sar_trn import NOMINAL, Setup, truth
 from navfilters.frames import ellipsoid_intersection
 from navfilters.sar.echo import Flight, Radar
@@ -31,3 +32,14 @@ def hit(setup):
 def small():
     """A quarter of PALSAR's wavelength and a seventh of its pulse; the same resolution."""
     return Radar(wavelength=0.059, pulse_length=4e-6)
+
+
+@pytest.fixture(scope="session")
+def imaging(small):
+    return Imaging(radar=small, lines=768, samples=256, half_width=1800.0)
+
+
+@pytest.fixture(scope="session")
+def acquired(setup, imaging):
+    """The first image of the closed loop, a tenth of its size."""
+    return acquire(setup, 1, imaging)

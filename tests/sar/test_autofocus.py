@@ -101,6 +101,51 @@ def test_climb_refuses(options, message):
         hill_climb(lambda v: v, 0.0, **options)
 
 
+@pytest.mark.parametrize("offset", [-60.0, -23.0, -8.5, 6.25, 31.0, 60.0])
+def test_autofocus_recovers_a_velocity_offset(acquired, offset):
+    """From either side to the truth, within the last step: the sharpest is not where it is true."""
+    climb = autofocus(
+        acquired.focuser,
+        acquired.speed + offset,
+        acquired.effective,
+        steps=(8.0, 2.0),
+        slope=acquired.slope,
+    )
+    assert climb.ended == "peak"
+    assert abs(climb.speed - acquired.speed) <= 2.0
+    assert len(climb.path) >= abs(offset) / 8
+
+
+@pytest.mark.parametrize("offset", [-60.0, -8.5, 31.0])
+def test_a_patch_climbs_to_the_same_peak(acquired, offset):
+    """On half of the ranges, straightened for a velocity that is off, within a step."""
+    start = acquired.speed + offset
+    options = {"steps": (8.0, 2.0), "slope": acquired.slope}
+    patch = acquired.focuser.patch(128, acquired.effective(start))
+    ends = [
+        autofocus(focuser, start, acquired.effective, **options)
+        for focuser in (acquired.focuser, patch)
+    ]
+    assert [climb.ended for climb in ends] == ["peak", "peak"]
+    assert abs(ends[1].speed - ends[0].speed) <= 2.0
+
+
+def test_a_constant_phase_changes_nothing(small, flight, hit):
+    window = centred_window(small, flight, hit, 96, 32)
+    echo = point_echo(small, flight, hit, window)
+    climbs = [
+        autofocus(
+            Focuser(receive(small, window, echo * turn), lines=96, samples=32),
+            7181.91 + 61.0,
+            lambda v: v,
+            steps=(16.0, 4.0),
+        )
+        for turn in (1.0, np.exp(0.7j))
+    ]
+    assert climbs[1].path == climbs[0].path
+    assert_allclose(climbs[1].value, climbs[0].value, rtol=1e-5)
+
+
 @pytest.mark.parametrize("start", [-83.0, 61.0])
 def test_autofocus_finds_the_velocity_of_a_point(small, flight, hit, start):
     """A quarter of the wavelength, a quarter of the sensitivity: hence the longer steps."""

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.ndimage import affine_transform
 
-from navfilters.experiments.sar_images import Imaging, _locate, acquire
+from navfilters.experiments.sar_images import _locate
 from navfilters.frames import ecef_to_geodetic
 from navfilters.sar.focus import GroundImage, to_ground
 from navfilters.sar.geolocate import (
@@ -16,16 +17,6 @@ from navfilters.sar.geolocate import (
     form_reference,
     geolocate,
 )
-
-
-@pytest.fixture(scope="module")
-def imaging(small):
-    return Imaging(radar=small, lines=768, samples=256, half_width=1800.0)
-
-
-@pytest.fixture(scope="module")
-def acquired(setup, imaging):
-    return acquire(setup, 1, imaging)
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +62,34 @@ def test_turned_images_match_too(acquired, ground):
     match = geolocate(turned, acquired.reference, relief=False)
     plain = geolocate(ground, acquired.reference, relief=False)
     assert np.linalg.norm(match.r_f - plain.r_f) < 8.0
+
+
+@pytest.mark.parametrize("angle", [-8.0, 5.0, 30.0, 175.0, 180.0])
+def test_images_turned_by_any_angle(acquired, ground, angle):
+    """About the centre pixel: its place to half a pixel, and the affine turns with it."""
+    cosine, sine = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+    turn, centre = np.array([[cosine, -sine], [sine, cosine]]), np.array(ground.centre)
+    values = affine_transform(ground.values, turn, centre - turn @ centre, order=1, mode="nearest")
+    match = geolocate(ground._replace(values=values), acquired.reference, relief=False)
+    plain = geolocate(ground, acquired.reference, relief=False)
+    assert np.linalg.norm(match.r_f - plain.r_f) < 5.0
+    turned = [np.arctan2(-m.affine[1, 0], m.affine[0, 0]) for m in (match, plain)]
+    assert_allclose(np.exp(1j * (turned[0] - turned[1])), cosine + 1j * sine, atol=0.02)
+
+
+def test_a_campaign_keeps_no_memory(acquired, ground):
+    """The highest use after ten more matches is that after three, to within one reference."""
+    resource = pytest.importorskip("resource")
+
+    def highest():
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+    for _ in range(3):
+        geolocate(ground, acquired.reference)
+    before = highest()
+    for _ in range(10):
+        geolocate(ground, acquired.reference)
+    assert highest() - before < 8 * acquired.reference.values.size
 
 
 def test_no_match_is_a_result(acquired, ground):

@@ -479,22 +479,32 @@ def cramer_rao_bound(
     unknown = np.array(burning) & (thrust == "unknown")
     F[:, :6, 6:] = unknown[:, None, None] * np.concatenate([np.eye(3) / 2, np.eye(3)])
     Q = np.pad(orbit.Q if process_noise else np.zeros((6, 6)), (0, 3))
+    Phi, W = _since_start(F.reshape(-1, setup.interval, 9, 9), Q)
+    H = np.pad(
+        sensor.jacobian(flight.states[setup.interval :: setup.interval]), [(0, 0)] * 2 + [(0, 3)]
+    )
     P = np.zeros((9, 9))
     P[:6, :6] = setup.prior.cov
-    deviation = [np.sqrt(np.diag(P)[:3])]
-    for t in range(setup.duration):
-        if t % setup.interval == 0:  # another acceleration, and nothing known of it
-            P[6:], P[:, 6:] = 0, 0
-            P[6:, 6:] = a**2 * np.eye(3)
-        P = F[t] @ P @ F[t].T + Q
-        if (t + 1) % setup.interval == 0:
-            H = np.pad(sensor.jacobian(flight.states[t + 1]), ((0, 0), (0, 3)))
-            P_xz = P @ H.T
-            K = right_divide(P_xz, H @ P_xz + sensor.R)
-            keep = np.eye(9) - K @ H
-            P = keep @ P @ keep.T + K @ sensor.R @ K.T  # Joseph form: P may span 20 decades
-        deviation.append(np.sqrt(np.diag(P)[:3]))
-    return np.array(deviation)
+    path = [P[None]]
+    for k in range(len(H)):
+        P[6:], P[:, 6:] = 0, 0  # another acceleration, and nothing known of it
+        P[6:, 6:] = a**2 * np.eye(3)
+        path.append(Phi[k] @ P @ Phi[k].mT + W[k])
+        P_xz = path[-1][-1] @ H[k].T
+        K = right_divide(P_xz, H[k] @ P_xz + sensor.R)
+        keep = np.eye(9) - K @ H[k]
+        P = keep @ path[-1][-1] @ keep.T + K @ sensor.R @ K.T  # Joseph: P may span 20 decades
+        path[-1][-1] = P
+    return np.sqrt(np.diagonal(np.concatenate(path), axis1=1, axis2=2)[:, :3])
+
+
+def _since_start(F: Array, Q: Array) -> tuple[Array, Array]:
+    """Transition and accumulated noise from each interval's start to each of its seconds."""
+    Phi, W = [F[:, 0]], [Q + np.zeros_like(F[:, 0])]
+    for step in np.moveaxis(F[:, 1:], 1, 0):
+        Phi.append(step @ Phi[-1])
+        W.append(step @ W[-1] @ step.mT + Q)
+    return np.stack(Phi, axis=1), np.stack(W, axis=1)
 
 
 def _named(argument: str, name: Any, known: Mapping[str, Any]) -> Any:

@@ -78,11 +78,13 @@ class Gravity:
         xiong2009, Eq. (36), rows 4 to 6.
         """
         xp = r.__array_namespace__()
-        z = r[..., 2:]
-        s = 1 / xp.linalg.vecdot(r, r)[..., None]
-        k = self._k * s
-        along = r * (1 + k * (1 - (5 * s) * (z * z)))
-        return (-self.mu * s * xp.sqrt(s)) * (along + (2 * k * z) * xp.asarray(AXIS))
+        z = r[..., 2]
+        s = 1 / xp.linalg.vecdot(r, r)
+        of_sphere = (-self.mu * s) * xp.sqrt(s)
+        of_J2 = (self._k * s) * of_sphere
+        along = of_sphere + of_J2 * (1 - (5 * s) * (z * z))
+        # One factor for each component: r is multiplied once, and the rest has no third axis.
+        return r * (along[..., None] + of_J2[..., None] * xp.asarray(2 * AXIS))
 
     def gradient(self, r: Array) -> Array:
         """Derivative of the acceleration with respect to position: the gravity gradient.

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from navfilters import validation
+from navfilters.linalg import matrix, vector
 from navfilters.types import Array
 
 
@@ -52,7 +53,7 @@ class RangeBearing:
         """
         xp = x.__array_namespace__()
         x1, x2 = x[..., 0], x[..., 1]
-        return xp.stack([xp.hypot(x1, x2), xp.atan2(x2, x1)], axis=-1)
+        return vector([xp.hypot(x1, x2), xp.atan2(x2, x1)])
 
     def jacobian(self, x: Array) -> Array:
         """First derivatives, (..., 2, 2): rows range and bearing, columns x1 and x2.
@@ -69,7 +70,7 @@ class RangeBearing:
         x1, x2 = x[..., 0], x[..., 1]
         r = xp.hypot(x1, x2)
         c, s = x1 / r, x2 / r
-        return _matrix(xp, c, s, -s / r, c / r)
+        return matrix([[c, s], [-s / r, c / r]])
 
     def hessian(self, x: Array) -> Array:
         """Second derivatives of range and of bearing, (..., 2, 2, 2).
@@ -86,11 +87,7 @@ class RangeBearing:
         x1, x2 = x[..., 0], x[..., 1]
         r = xp.hypot(x1, x2)
         c, s = x1 / r, x2 / r
-        of_range = _matrix(xp, s * s, -s * c, -s * c, c * c) / r[..., None, None]
+        of_range = matrix([[s * s, -s * c], [-s * c, c * c]]) / r[..., None, None]
         sin_2, cos_2 = 2 * s * c, c * c - s * s
-        of_bearing = _matrix(xp, sin_2, -cos_2, -cos_2, -sin_2) / (r * r)[..., None, None]
-        return xp.stack([of_range, of_bearing], axis=-3)
-
-
-def _matrix(xp, a: Array, b: Array, c: Array, d: Array) -> Array:
-    return xp.stack([xp.stack([a, b], axis=-1), xp.stack([c, d], axis=-1)], axis=-2)
+        of_bearing = matrix([[sin_2, -cos_2], [-cos_2, -sin_2]]) / (r * r)[..., None, None]
+        return xp.moveaxis(xp.stack([of_range, of_bearing]), 0, -3)

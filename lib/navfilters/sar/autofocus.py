@@ -143,6 +143,7 @@ def autofocus(
     Parameters
     ----------
     focuser : Focuser
+        Or a patch of it: see ``Focuser.patch``. The fewer ranges, the rougher the curve.
     start : float
         In-track velocity that is predicted, m/s.
     effective : callable

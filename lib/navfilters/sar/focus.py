@@ -4,6 +4,7 @@ The processor knows the header of the data and the velocity it assumes, nothing 
 range of a point is taken to be the hyperbola R^2 = R_0^2 + V^2 t^2.
 """
 
+from copy import copy
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -12,7 +13,20 @@ from scipy.constants import c
 from scipy.ndimage import map_coordinates
 
 from navfilters import validation
+from navfilters.sar._blocks import (
+    PIECE,
+    Phase,
+    blocks,
+    fast_length,
+    in_threads,
+    lines_at_once,
+    phasor,
+    unit,
+)
 from navfilters.types import Array
+
+GUARD = 32
+"""Samples on each side of a patch, over which it fades."""
 
 
 class RawData(Protocol):
@@ -141,6 +155,9 @@ class Focuser:
     swath; over an image of 4.8 km the remaining migration is below 0.05 samples at its edges. The
     azimuth filter is exact at every range.
 
+    Only the range-compressed spectrum is kept, not the raw data. An image needs two inverse FFTs;
+    everything else is done on blocks of lines that fit the cache, in two threads.
+
     References
     ----------
     pogorelsky2020, section "SAR image formation", and Cumming and Wong, which it cites.
@@ -173,25 +190,34 @@ class Focuser:
                 raise ValueError(f"{name} must be at most {most} for these data; found {value}")
         if bandwidth is not None and not 0 < bandwidth <= raw.prf:
             raise ValueError(f"bandwidth must be in (0, {raw.prf}] Hz; found {bandwidth}")
-        self._raw = raw
+        self._wavelength, self._sampling, self._prf = raw.wavelength, raw.sampling, raw.prf
+        self._near_range, self._first_time = raw.near_range, raw.first_time
         self._lines, self._samples = lines or pulses, samples or whole
         self._first = (pulses - self._lines) // 2
-        self._migration = migration
-        self._n, m = fft.next_fast_len(pulses), fft.next_fast_len(ranges)
+        self._n, m = fft.next_fast_len(pulses), fast_length(ranges)
         f = fft.fftfreq(self._n, 1 / raw.prf)
         f = doppler_centroid + (f - doppler_centroid + raw.prf / 2) % raw.prf - raw.prf / 2
         half = (bandwidth or 1.01 * raw.prf) / 2
-        self._kept = np.flatnonzero(np.abs(f - doppler_centroid) <= half)
+        kept = np.flatnonzero(np.abs(f - doppler_centroid) <= half)
+        self._kept = kept[np.argsort(f[kept])]  # neighbours in frequency, as the blocks need them
         self._f, self._f_R = f[self._kept], fft.fftfreq(m, 1 / raw.sampling)
-        spectrum = fft.fft(data.astype(np.complex64, copy=False), m, axis=1, workers=2)
-        spectrum *= _matched(raw, m)
-        spectrum = fft.fft(spectrum, self._n, axis=0, workers=2, overwrite_x=True)
+        self._migration = migration
+        self._removed = np.inf  # the velocity for which migration is gone: at none, there is none
+        matched = _matched(raw, m)
+        spectrum = np.zeros((self._n, m), np.complex64)
+
+        def compress(rows: slice) -> None:
+            pulse = fft.fft(data[rows].astype(np.complex64, copy=False), m, axis=1)
+            np.multiply(pulse, matched, out=spectrum[rows])
+
+        in_threads(compress, blocks(pulses, 64))
+        spectrum = fft.fft(spectrum, axis=0, workers=2, overwrite_x=True)
         self._spectrum = spectrum[self._kept]
 
     @property
     def range_spacing(self) -> float:
         """dr = c / (2 f_s), m. Eq. (2)."""
-        return c / (2 * self._raw.sampling)
+        return c / (2 * self._sampling)
 
     def image(self, velocity: float, slope: float = 0.0) -> Image:
         """Focus for an effective velocity.
@@ -220,51 +246,118 @@ class Focuser:
         ----------
         pogorelsky2020, section "SAR image formation".
         """
-        raw, f = self._raw, self._f
-        least = raw.wavelength * np.abs(f).max() / 2
+        migration, R_mid = self._migrated(velocity), self._middle_range
+
+        def compression(f: Array, distance: Array) -> Array:
+            squared = velocity**2 + slope * distance
+            D = np.sqrt(1 - (self._wavelength * f / 2) ** 2 / squared)
+            return 4 * np.pi / self._wavelength * (R_mid + distance) * (D - 1)
+
+        def change(f: Array, distance: Array) -> Array:
+            return compression(f, distance) - compression(f, np.zeros(1))
+
+        in_the_middle = unit(compression(self._f[:, None], np.zeros(1)))
+        size = -(-self._samples // PIECE) * PIECE
+        distance = self.range_spacing * (np.arange(size) - self._samples // 2)
+        padded = np.zeros((self._n, self._samples), np.complex64)
+
+        def fill(lines: slice) -> None:
+            data = phasor(change, self._f[lines], distance)[:, : self._samples]
+            data *= in_the_middle[lines]
+            data *= self._straightened(migration, lines)[:, : self._samples]
+            padded[self._kept[lines]] = data
+
+        most = lines_at_once(self._f, (migration, self._f_R), (change, distance))
+        in_threads(fill, blocks(len(self._f), most))
+        focused = fft.ifft(padded, axis=0, workers=2, overwrite_x=True)
+        return Image(
+            focused[self._first : self._first + self._lines].copy(),  # without the other lines
+            self._first_time + self._first / self._prf,
+            self._prf,
+            self._near_range,
+            self.range_spacing,
+        )
+
+    def patch(self, samples: int, velocity: float) -> "Focuser":
+        """The same data at the middle ranges alone, whose images cost in proportion: to climb on.
+
+        The migration of one velocity is removed from all ranges before they are cut; the images of
+        the patch correct what another velocity leaves.
+
+        Parameters
+        ----------
+        samples : int
+            Of the patch.
+        velocity : float
+            In the middle of those at which it will be focused, m/s.
+
+        Returns
+        -------
+        Focuser
+            Of the same lines. Its images are the middle columns of the whole ones, to 0.5 % of
+            their amplitude for each sample by which the migrations of the two velocities differ.
+
+        Raises
+        ------
+        ValueError
+            Naming the argument, the value found and what is needed.
+        """
+        most = min(self._samples, len(self._f_R) - 2 * GUARD)
+        if validation.whole_number("samples", samples, 2) > most:
+            raise ValueError(f"samples must be at most {most} for these data; found {samples}")
+        migration = self._migrated(velocity)
+        start = self._samples // 2 - samples // 2
+        m = fast_length(samples + 2 * GUARD)
+        # the patch comes first, then the guard behind it and, from the end, that in front of it
+        behind = (m - samples) // 2
+        place = np.r_[: samples + behind, samples + behind - m : 0]
+        outside = np.abs(place - np.clip(place, 0, samples - 1))
+        fading = np.cos(np.pi / 2 * outside / (behind + 1)).astype(np.float32) ** 2
+        column = (start + place) % len(self._f_R)
+        part = copy(self)
+        part._samples, part._near_range = samples, self._near_range + start * self.range_spacing
+        part._f_R = fft.fftfreq(m, 1 / self._sampling)
+        part._removed = velocity
+        part._spectrum = np.empty((len(self._f), m), np.complex64)
+
+        def cut(lines: slice) -> None:
+            data = self._straightened(migration, lines)[:, column]
+            part._spectrum[lines] = fft.fft(data * fading, axis=1, overwrite_x=True)
+
+        most = lines_at_once(self._f, (migration, self._f_R))
+        in_threads(cut, blocks(len(self._f), most))
+        return part
+
+    @property
+    def _middle_range(self) -> float:
+        """Where ``velocity`` holds and migration is removed exactly, m."""
+        return self._near_range + self._samples // 2 * self.range_spacing
+
+    def _migrated(self, velocity: float) -> Phase:
+        """A(f_t, f_R): removes the migration and secondary range compression that are left."""
+        least = self._wavelength * np.abs(self._f).max() / 2
         if not (np.isfinite(velocity) and velocity > 2 * least):
             raise ValueError(
                 f"velocity must be finite and above {2 * least:.0f} m/s; found {velocity}"
             )
-        middle = self._samples // 2
-        R_mid = raw.near_range + middle * self.range_spacing
-        data = fft.ifft(self._straightened(velocity, R_mid), axis=1, workers=2, overwrite_x=True)
-        offset = self.range_spacing * (np.arange(self._samples) - middle)
+        carrier = c / self._wavelength
+        scale = 4 * np.pi / c * self._middle_range if self._migration else 0.0
 
-        def filter_phase(distance: float) -> Array:
-            squared = velocity**2 + slope * distance
-            D = np.sqrt(1 - (raw.wavelength * f / 2) ** 2 / squared)
-            return 4 * np.pi / raw.wavelength * (R_mid + distance) * (D - 1)
+        def removing(f: Array, f_R: Array, velocity: float) -> Array:
+            D = np.sqrt(1 - (self._wavelength * f / (2 * velocity)) ** 2)
+            whole = np.sqrt((carrier + f_R) ** 2 - (c * f / (2 * velocity)) ** 2)
+            return scale * (whole - carrier * D - f_R)
 
-        reach = 1000.0  # the phase is linear in range to 1e-3 rad over tens of kilometres
-        by_range = (filter_phase(reach) - filter_phase(-reach)) / (2 * reach)
-        padded = np.zeros((self._n, self._samples), np.complex64)
-        padded[self._kept] = data[:, : self._samples] * _ramp(by_range, offset)
-        padded[self._kept] *= np.exp(1j * filter_phase(0.0)).astype(np.complex64)[:, None]
-        focused = fft.ifft(padded, axis=0, workers=2, overwrite_x=True)
-        pixels = focused[self._first : self._first + self._lines]
-        return Image(
-            pixels,
-            raw.first_time + self._first / raw.prf,
-            raw.prf,
-            raw.near_range,
-            self.range_spacing,
-        )
+        def phase(f: Array, f_R: Array) -> Array:
+            return removing(f, f_R, velocity) - removing(f, f_R, self._removed)
 
-    def _straightened(self, velocity: float, slant_range: float) -> Array:
-        """The spectrum with migration and secondary range compression removed."""
-        if not self._migration:
-            return self._spectrum.copy()
-        carrier = c / self._raw.wavelength
-        # sqrt((f_0 + f_R)^2 - (c f_t / 2V)^2) - f_0 D - f_R, in powers of f_R
-        D = np.sqrt(1 - (self._raw.wavelength * self._f / (2 * velocity)) ** 2)
-        first = 1 / D - 1
-        second = (1 - 1 / D**2) / (2 * carrier * D)
-        third = -second / (carrier * D**2)
-        powers = np.stack([self._f_R, self._f_R**2, self._f_R**3])
-        scale = 4 * np.pi * slant_range / c
-        phase = (np.stack([first, second, third], axis=1) * scale) @ powers
-        return self._spectrum * _unit(phase.astype(np.float32))
+        return phase
+
+    def _straightened(self, migration: Phase, lines: slice) -> Array:
+        """Ranges of a block of lines, of which migration is removed."""
+        data = phasor(migration, self._f[lines], self._f_R)
+        data *= self._spectrum[lines]
+        return fft.ifft(data, axis=1, overwrite_x=True)
 
 
 def _matched(raw: RawData, m: int) -> Array:
@@ -273,22 +366,6 @@ def _matched(raw: RawData, m: int) -> Array:
     phase = np.pi * raw.chirp_rate * (t - raw.pulse_length / 2) ** 2
     chirp = np.where(t < raw.pulse_length, np.exp(1j * phase), 0)
     return (np.conj(fft.fft(chirp)) / np.linalg.norm(chirp)).astype(np.complex64)
-
-
-def _unit(phase: Array) -> Array:
-    """exp(i phase) in single precision."""
-    z = np.empty(phase.shape, np.complex64)
-    np.cos(phase, out=z.real)
-    np.sin(phase, out=z.imag)
-    return z
-
-
-def _ramp(rate: Array, offset: Array, block: int = 32) -> Array:
-    """exp(i rate offset) for evenly spaced offsets, (n, m), as products of few exponentials."""
-    coarse = _unit(np.outer(rate, offset[::block]).astype(np.float32))
-    fine = _unit(np.outer(rate, offset[:block] - offset[0]).astype(np.float32))
-    product = coarse[:, :, None] * fine[:, None, :]
-    return product.reshape(len(rate), -1)[:, : len(offset)]
 
 
 def multilook(image: Image, azimuth: int = 4, in_range: int = 2) -> Array:

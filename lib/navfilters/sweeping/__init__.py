@@ -74,6 +74,8 @@ def sweep(
         (prior, z, model) -> Gaussian, such as a member of ``FILTERS`` or a ``functools.partial`` of
         one; or ``init(prior) -> state`` and ``step(state, z, dynamics, sensor) -> state``, such as
         those of ``navfilters.robust``. Options may be arrays (...), one value per configuration.
+        Where its call, or its ``step``, has a parameter named ``step`` without a default, that is
+        given the number of the step, from 0: an integer, traced under JAX.
     priors : Gaussian
         mean (..., n), cov (..., n, n). Leading axes are batch axes and broadcast with those of
         all other arguments: each member of the whole batch is one configuration.
@@ -125,8 +127,14 @@ def sweep(
     Notes
     -----
     A configuration's result depends neither on the others, nor on their order, nor on the workers;
-    nor on the chunk, unless it is smaller than 2 under NumPy or 512 under JAX: then the last bits
+    nor on the chunk, unless it is smaller than 512 under JAX, or than 2 under NumPy where products
+    are left to BLAS (in a model, or with more than two states or measurements): then the last bits
     of each step may differ.
+
+    A filter whose state is no Gaussian, such as the multiplicative EKF with its quaternion, is
+    swept as one with a memory: ``priors`` are in the coordinates of its error, ``init`` makes a
+    named tuple of arrays from them, and the ``estimate`` of that tuple is the Gaussian again. What
+    differs from step to step is an array in the model, or in the filter, that ``step`` indexes.
 
     Examples
     --------

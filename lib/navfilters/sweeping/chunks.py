@@ -1,12 +1,13 @@
 """Some members of a sweep, all steps: what one process does in one go, whatever the engine."""
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from navfilters.linalg import is_positive_definite
+from navfilters.linalg import WRITTEN_OUT, is_positive_definite
 from navfilters.sweeping.trees import Tree, unflatten
 from navfilters.types import Array, Gaussian
 
@@ -98,6 +99,8 @@ class March:
         problem = unflatten(job.tree, arrays)
         self.estimator, self.prior, self.z, self.model, self.truth = problem
         self.remembers = hasattr(self.estimator, "step")
+        self.update = self.estimator.step if self.remembers else self.estimator
+        self.counts = _asks_for_step(self.update)
 
     def start(self) -> tuple[Carry, Row]:
         """Before any step."""
@@ -108,10 +111,9 @@ class March:
 
     def advance(self, carry: Carry, k: Array, z: Array, truth: Array | None) -> tuple[Carry, Row]:
         """Step k, counted from 1."""
-        if self.remembers:
-            state = self.estimator.step(carry.state, z, *self.model)
-        else:
-            state = self.estimator(carry.state, z, self.model)
+        models = self.model if self.remembers else (self.model,)
+        count = {"step": k - 1} if self.counts else {}
+        state = self.update(carry.state, z, *models, **count)
         return self._look(k, state, carry.indefinite, truth)
 
     def step(self, carry: Carry, k: int) -> tuple[Carry, Row]:
@@ -141,6 +143,12 @@ class March:
             miss = estimate.mean[..., : truth.shape[-1]] - truth
             error = xp.linalg.vector_norm(miss, axis=-1)
         return Carry(state, lost), Row(error, estimate if "history" in keep else None)
+
+
+def _asks_for_step(update: Callable) -> bool:
+    """Whether a parameter is called step and has no value yet."""
+    step = inspect.signature(update).parameters.get("step")
+    return step is not None and step.default is step.empty
 
 
 def compute(job: Job, chunk: Chunk) -> Kept:
@@ -177,6 +185,8 @@ def compute(job: Job, chunk: Chunk) -> Kept:
 def by_numpy(job: Job, arrays: list[np.ndarray]) -> Kept:
     """All steps under NumPy."""
     march = March(job, arrays)
+    if march.prior.mean.shape[-1] <= WRITTEN_OUT:
+        march = March(job, list(map(_members_innermost, arrays, job.axes)))
     with np.errstate(all="ignore"):  # a member that fails is NaN in the result: that is its report
         carry, row = march.start()
         rows = [row]
@@ -187,6 +197,13 @@ def by_numpy(job: Job, arrays: list[np.ndarray]) -> Kept:
     error = np.stack(errors) if "error" in job.keep else None
     history = Gaussian(*map(np.stack, zip(*states, strict=True))) if "history" in job.keep else None
     return march.finish(carry, Row(error, history))
+
+
+def _members_innermost(array: np.ndarray, axis: int | None) -> np.ndarray:
+    """The same array in the order of memory that ``linalg`` likes for small states."""
+    if axis is None:
+        return array
+    return np.moveaxis(np.ascontiguousarray(np.moveaxis(array, axis, -1)), -1, axis)
 
 
 def _guilty(job: Job, chunk: Chunk, error: Exception) -> tuple[list[int], Exception]:

@@ -1,0 +1,58 @@
+"""Interpolated phase factors against all the sines and cosines."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from navfilters.sar._blocks import PIECE, blocks, in_threads, lines_at_once, phasor, unit
+
+
+def quadratic(rate):
+    """A phase that changes by so many radians a line at its steepest: (frequencies, places)."""
+    f, x = np.linspace(-500.0, 500.0, 1000), np.linspace(-1.0, 1.0, 3 * PIECE)
+    return f, x, lambda f, x: rate * 500 * x * (f / 500) ** 2
+
+
+@pytest.mark.parametrize("rate", [0.0, 1e-4, 0.03, 0.4, 5.0])
+def test_a_block_is_short_enough(rate):
+    """To 5e-5 rad, and blocks four times as long are not: the rule is needed."""
+    f, x, phase = quadratic(rate)
+    most = lines_at_once(f, (phase, x))
+    wanted = np.exp(1j * phase(f[:, None], x))
+    error = [
+        max(np.abs(phasor(phase, f[b], x) - wanted[b]).max() for b in blocks(len(f), n))
+        for n in (most, 4 * most)
+    ]
+    assert error[0] < 5e-5
+    assert rate < 0.01 or error[1] > 1e-3
+
+
+@pytest.mark.parametrize(("lines", "most"), [(3, 1), (80, 10), (100_000, 512)])
+def test_level_phases_have_blocks_of_limited_length(lines, most):
+    f, x, phase = quadratic(0.0)
+    assert lines_at_once(np.linspace(f[0], f[-1], lines), (phase, x)) == most
+
+
+def test_large_phases_are_reduced_before_they_are_rounded():
+    phase = np.array([1e6, -123456.789, 0.0])
+    assert_allclose(unit(phase), np.exp(1j * phase), atol=2e-7)
+    assert unit(phase).dtype == np.complex64
+
+
+def test_blocks_make_up_all_lines():
+    assert blocks(7, 3) == [slice(0, 3), slice(3, 6), slice(6, 7)]
+    done = np.zeros(1000, int)
+
+    def work(lines):
+        done[lines] += 1
+
+    in_threads(work, blocks(1000, 7))
+    assert_array_equal(done, 1)
+
+
+def test_errors_leave_the_threads():
+    def work(lines):
+        raise ZeroDivisionError("in a thread")
+
+    with pytest.raises(ZeroDivisionError, match="in a thread"):
+        in_threads(work, blocks(10, 2))
