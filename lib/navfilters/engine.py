@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from navfilters import linalg, validation
+from navfilters._memory import keep_freed_memory
 from navfilters.types import Array, Gaussian, MeasurementModel
 
 
@@ -69,6 +70,7 @@ def run(
     validation.whole_number("steps", steps, 0)
     prior = validation.gaussian("prior", prior)
     z, batch = validation.measurements(z, prior, model, int(steps), z_varies)
+    keep_freed_memory()
     state, states = prior, [prior]
     with np.errstate(all="ignore"):  # a member that fails is NaN in the result: that is its report
         for k in range(steps):

@@ -149,10 +149,11 @@ def test_ctrl_c_says_what_was_finished(stored, tmp_path):
 
 
 LONG = """
-import sys, numpy as np
+import signal, sys
 from test_workers import BASE, EKF, priors, sweep
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
     sweep(EKF, priors(4000), BASE.z, BASE.model, 4000, chunk=20, workers=2, checkpoint=sys.argv[1])
 """
 

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from navfilters._memory import keep_freed_memory
 from navfilters._progress import progress as progress_bar
 from navfilters.linalg import right_divide
 from navfilters.models.orbit import COASTING, EARTH, Gravity, Orbit, Thrust, perigee_apogee
@@ -299,6 +300,7 @@ def errors(
         Truth minus estimate, m: of predictions between the measurements, and of the updated
         estimate at their times. Not finite from where a member failed.
     """
+    keep_freed_memory()
     flight, sensor, every = truth(setup), setup.sensor, round(1 / setup.step)
     orbit = setup.orbit(flight.thrust if knows_thrust else COASTING)
     v, sigma = noise(seeds, setup), setup.sigma[..., None]

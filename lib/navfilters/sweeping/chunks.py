@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from navfilters._memory import keep_freed_memory
 from navfilters.linalg import WRITTEN_OUT, is_positive_definite
 from navfilters.sweeping.trees import Tree, unflatten
 from navfilters.types import Array, Gaussian
@@ -184,6 +185,7 @@ def compute(job: Job, chunk: Chunk) -> Kept:
 
 def by_numpy(job: Job, arrays: list[np.ndarray]) -> Kept:
     """All steps under NumPy."""
+    keep_freed_memory()
     march = March(job, arrays)
     if march.prior.mean.shape[-1] <= WRITTEN_OUT:
         march = March(job, list(map(_members_innermost, arrays, job.axes)))
