@@ -25,6 +25,7 @@ import numpy as np
 from navfilters.experiments.palsar_patches import (
     Patch,
     cut_patches,
+    fitted,
     flight_through,
     lines_between,
 )
@@ -192,7 +193,7 @@ def run_filter(
         walk=False,
     )
     errors = setup.sigma_range * noise(runs, len(patches), seed).slant_range
-    images = RealImages(patches, errors, imaging)
+    images = RealImages(patches, errors, fitted(imaging, product))
     flight = true_flight(product, patches, setup)
     result = monte_carlo(
         setup, len(patches), runs, seed, flight=flight, measure=images, progress=progress
