@@ -160,7 +160,7 @@ def write_product(folder, orbit, world, line, numbers):
     return files.product(folder, image, leader)
 
 
-def write_geotiff(path, values, crs, west, north, step, **options):
+def write_geotiff(path, values, crs, west, north, step, units="", **options):
     """Rows from north to south; west and north are the middle of the first pixel."""
     place = rasterio.Affine(step, 0.0, west - step / 2, 0.0, -step, north + step / 2)
     rows, columns = values.shape
@@ -173,6 +173,7 @@ def write_geotiff(path, values, crs, west, north, step, **options):
     }
     with rasterio.open(path, "w", crs=crs, transform=place, **profile, **options) as file:
         file.write(values, 1)
+        file.units = [units]
     return path
 
 
@@ -194,7 +195,7 @@ def orthoimage(scene, seed):
     return 10 * np.log10((power / 100 + 0.005) * speckle)
 
 
-def write_reference(path, scenes, shown=None, step=12.5, seed=9):
+def write_reference(path, scenes, shown=None, step=12.5, seed=9, units="dB"):
     """On a map in metres, the surroundings of the scenes alone, or what is ``shown`` in place."""
     places = np.array([(scene.map.longitude, scene.map.latitude) for scene in scenes])
     x, y = (np.array(a) for a in warp.transform("EPSG:4326", UTM, *places.T))
@@ -211,7 +212,7 @@ def write_reference(path, scenes, shown=None, step=12.5, seed=9):
         image = orthoimage((shown or scenes)[k], [seed, k])
         sampled = map_coordinates(image, where, order=1, mode="nearest")
         values[np.ix_(rows, columns)] = sampled.reshape(grid[0].shape)
-    options = {"nodata": -999.0, "compress": "deflate", "tiled": True}
+    options = {"nodata": -999.0, "compress": "deflate", "tiled": True, "units": units}
     return write_geotiff(path, values, UTM, west, north, step, **options)
 
 
@@ -412,6 +413,17 @@ def test_the_command_navigates(folder, capsys, monkeypatch):
 
 
 @pytest.mark.slow
+def test_a_reference_whose_unit_is_open_needs_it_said(folder, product, patches, world, tmp_path):
+    """The scenes lie about 0 dB: as many pixels are below as above."""
+    path = write_reference(tmp_path / "plain.tif", world.scenes, units="")
+    with pytest.raises(ValueError, match=r"plain\.tif must tell whether it is in dB or linear"):
+        cut_patches(product, folder / "dem.tif", path, imaging=SMALL)
+    said = cut_patches(product, folder / "dem.tif", path, imaging=SMALL, unit="dB")
+    values = [patch.acquired.reference.values for patch in (*patches, *said)]
+    assert_array_equal(values[:3], values[3:])
+
+
+@pytest.mark.slow
 def test_a_reference_of_another_place_is_reported(folder, product, world, tmp_path):
     """Each patch is shown the surroundings of the next: dead reckoning, but a table."""
     shown = [*world.scenes[1:], world.scenes[0]]
@@ -525,6 +537,19 @@ def test_options_reach_the_reader(monkeypatch, capsys):
     assert ended.value.code == (
         "A {'polarisation': 'HV', 'records': [5, 900], 'clock_offset': -0.002}"
     )
+
+
+def test_the_unit_of_the_reference_reaches_its_reader(monkeypatch, capsys):
+    monkeypatch.setattr(palsar_loop, "open_product", lambda folder, **options: None)
+
+    def cutting(product, elevation, reference, **options):
+        raise ValueError(f"{elevation} {reference} {options['unit']} {options['geoid']}")
+
+    monkeypatch.setattr(palsar_loop, "cut_patches", cutting)
+    for more, said in (("--reference-unit linear --geoid 7", "linear 7.0"), ("", "None 0.0")):
+        with pytest.raises(SystemExit) as ended:
+            sar_trn.main(f"--closed-loop --palsar A --dem B --reference C {more}".split())
+        assert ended.value.code == f"B C {said}"
 
 
 def test_the_closed_loop_is_a_command_of_its_own(monkeypatch):

@@ -272,6 +272,7 @@ def report(
     seed: int = 0,
     *,
     geoid: float = 0.0,
+    unit: str | None = None,
     imaging: Imaging = FULL,
     progress: Callable[[Iterable], Iterable] = iter,
     **options: Any,
@@ -289,6 +290,8 @@ def report(
         See ``run_filter``.
     geoid : float
         See ``read_terrain``.
+    unit : {"dB", "linear"}, optional
+        Of the reference: see ``read_reference``.
     imaging : Imaging
     progress : callable
         Wraps the iterable of images.
@@ -305,6 +308,8 @@ def report(
         As ``open_product`` and ``cut_patches``.
     """
     setup, product = of_case(case), open_product(folder, **options)
-    patches = cut_patches(product, elevation, reference, setup=setup, imaging=imaging, geoid=geoid)
+    patches = cut_patches(
+        product, elevation, reference, setup=setup, imaging=imaging, geoid=geoid, unit=unit
+    )
     outcome = run_filter(product, patches, setup, runs, seed, imaging=imaging, progress=progress)
     return table(product, patches, outcome)

@@ -195,6 +195,7 @@ def cut_patches(
     setup: Setup = Setup(),
     imaging: Imaging = FULL,
     geoid: float = 0.0,
+    unit: str | None = None,
 ) -> list[Patch]:
     """Up to three patches at the middle of the swath, one interval of the filter apart.
 
@@ -211,6 +212,8 @@ def cut_patches(
         is not used.
     geoid : float
         See ``read_terrain``.
+    unit : {"dB", "linear"}, optional
+        Of the reference: see ``read_reference``.
 
     Returns
     -------
@@ -236,7 +239,7 @@ def cut_patches(
     sizes = _sizes(product, setup, imaging)
     starts = first_lines(product.missing, sizes.pulses, lines_between(product, setup))
     return [
-        _cut(product, int(first), sizes, elevation, reference, setup, imaging, geoid)
+        _cut(product, int(first), sizes, elevation, reference, setup, imaging, geoid, unit)
         for first in starts
     ]
 
@@ -289,6 +292,7 @@ def _cut(
     setup: Setup,
     imaging: Imaging,
     geoid: float,
+    unit: str | None,
 ) -> Patch:
     last = first + sizes.pulses
     time = float(product.line_times[first + sizes.pulses // 2])
@@ -306,6 +310,7 @@ def _cut(
         half_width=imaging.half_width,
         pixel=imaging.pixel,
         needed=float(max(across, along)) / 2,
+        unit=unit,
         matcher=imaging.matcher,
     )
     raw = Raw(

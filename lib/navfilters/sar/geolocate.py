@@ -103,9 +103,14 @@ class Matcher:
 
         Raises
         ------
+        ValueError
+            A value that is not finite.
         ImportError
             Without OpenCV.
         """
+        if not np.isfinite(values).all():
+            count = int((~np.isfinite(values)).sum())
+            raise ValueError(f"values must be finite; found {count} that are not")
         low, high = np.percentile(values, [1, 99])
         grey = np.clip((values - low) / max(high - low, 1e-9), 0, 1) * 255
         sift = _cv2().SIFT_create(

@@ -86,7 +86,7 @@ class LocalMap:
         Parameters
         ----------
         latitude, longitude : array (...)
-            Geodetic, deg.
+            Geodetic, deg; whole turns do not count.
 
         Returns
         -------
@@ -94,7 +94,13 @@ class LocalMap:
             East and north, m.
         """
         to_east, to_north = self.metres
-        return (longitude - self.longitude) * to_east, (latitude - self.latitude) * to_north
+        turned = longitude - _turns(longitude, self.longitude)
+        return (turned - self.longitude) * to_east, (latitude - self.latitude) * to_north
+
+
+def _turns(longitude: Any, near: float) -> Any:
+    """The whole turns, deg, by which longitudes are farther than half a turn from another."""
+    return 360.0 * np.round((np.asarray(longitude) - near) / 360.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +143,7 @@ class Terrain:
         Parameters
         ----------
         latitude, longitude : array (...)
-            Geodetic, deg.
+            Geodetic, deg; whole turns do not count.
 
         Returns
         -------
@@ -146,7 +152,8 @@ class Terrain:
         """
         place = np.broadcast_arrays(latitude, longitude)
         row = (place[0] - self.south) / self.spacing
-        column = (place[1] - self.west) / self.spacing
+        middle = self.west + self.spacing * (self.posts.shape[1] - 1) / 2
+        column = (place[1] - _turns(place[1], middle) - self.west) / self.spacing
         where = np.stack([np.ravel(row), np.ravel(column)])  # no axes are too few for SciPy
         height = map_coordinates(
             self._coefficients, where, order=3, mode="mirror", prefilter=False
