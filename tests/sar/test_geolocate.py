@@ -197,7 +197,7 @@ def test_matcher_refuses(change, message):
 
 def test_opencv_is_asked_for_by_name(monkeypatch):
     monkeypatch.setitem(sys.modules, "cv2", None)
-    with pytest.raises(ImportError, match="pip install opencv-python-headless"):
+    with pytest.raises(ImportError, match=r"needs OpenCV: pip install navfilters\[sar\]"):
         Matcher().features(np.zeros((9, 9)))
 
 

@@ -13,6 +13,7 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 from navfilters import validation
+from navfilters._extras import command
 from navfilters._progress import progress as progress_bar
 from navfilters.attitude import (
     conjugate,
@@ -783,4 +784,4 @@ def _on_product(chosen: argparse.Namespace) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

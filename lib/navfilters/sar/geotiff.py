@@ -8,7 +8,6 @@ What a file does not declare is not guessed from a pixel: values that no ground 
 refused with their place, and an image that may be in decibels or not is refused until it is said.
 """
 
-import importlib
 import re
 import warnings
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import ndimage
 
+from navfilters._extras import needed
 from navfilters.sar.geolocate import MATCHER, Matcher, Reference
 from navfilters.sar.scene import LocalMap, Scene, Terrain
 from navfilters.types import Array
@@ -557,7 +557,4 @@ def _warped_here(
 
 
 def _rasterio(module: str) -> Any:
-    try:
-        return importlib.import_module(module)
-    except ImportError:
-        raise ImportError("GeoTIFF files need rasterio: pip install navfilters[palsar]") from None
+    return needed(module, "navfilters[palsar]", "a GeoTIFF file")

@@ -22,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
+from navfilters._extras import command
 from navfilters.sar._ceos import SPEED_OF_LIGHT, Record, take
 from navfilters.sar._palsar_contents import contents
 from navfilters.sar._palsar_image import PREFIX, Headers, grid, read_headers
@@ -393,4 +394,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

@@ -18,6 +18,7 @@ from scipy.ndimage import map_coordinates, spline_filter
 from scipy.optimize import brentq
 
 from navfilters import validation
+from navfilters._extras import needed
 from navfilters.frames import (
     FLATTENING,
     SEMI_MAJOR,
@@ -177,13 +178,7 @@ def sample_posts() -> Array:
     ImportError
         Without matplotlib.
     """
-    try:
-        from matplotlib.cbook import get_sample_data
-    except ImportError:
-        raise ImportError(
-            "the sample terrain needs matplotlib: pip install navfilters[book]"
-        ) from None
-    tile: Any = get_sample_data(TILE)
+    tile = needed("matplotlib.cbook", "navfilters[sar]", "the sample terrain").get_sample_data(TILE)
     with tile:
         posts = tile["elevation"][::-1].astype(float)
     posts.setflags(write=False)
