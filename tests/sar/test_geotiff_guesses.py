@@ -1,5 +1,6 @@
 """Files that do not say what their numbers are: read right, or refused with the true reason."""
 
+import time
 import warnings
 
 import numpy as np
@@ -274,6 +275,58 @@ def test_an_undeclared_void_is_no_height(tmp_path, void, kind, size):
         read_terrain(path, PLACE, 3000.0)
     assert_allclose(median_height(path, PLACE, 3000.0), wanted, atol=5.0)
     assert read_terrain(path, LocalMap(29.92, -95.0), 1500.0).posts.min() > 100
+
+
+@pytest.mark.parametrize("scale", [0.1, 0.01])
+def test_a_void_of_scaled_numbers_is_none_either(tmp_path, scale):
+    """-32768 hundredths are a height that the Earth has."""
+    posts = np.round(hills(level=100.0, spread=20.0) / scale).astype("int16")
+    path = dem(tmp_path / "a.tif", posts)
+    with rasterio.open(path, "r+") as file:
+        file.scales = [scale]
+    found = read_terrain(path, PLACE, 3000.0)
+    assert_allclose(found.height(30.0, -95.0), scale * posts[150, 150], atol=1e-6)
+    posts[150, 150] = -32768
+    with rasterio.open(path, "r+") as file:
+        file.write(posts, 1)
+    with pytest.raises(
+        ValueError, match=r"found -32768 at 30\.0000, -95\.0000 deg and 0 other pos"
+    ):
+        read_terrain(path, PLACE, 3000.0)
+
+
+@pytest.mark.parametrize("more", [{}, {"compress": "deflate"}])
+@pytest.mark.parametrize("share", [0.05, 0.4, 0.7])
+def test_a_file_that_is_cut_is_called_by_its_name(tmp_path, more, share):
+    path = dem(tmp_path / "a.tif", hills().astype("float32"), **more)
+    data = path.read_bytes()
+    path.write_bytes(data[: int(share * len(data))])
+    for reads in (read_terrain, median_height):
+        with pytest.raises(OSError, match=r"a\.tif is damaged, or cut: .*"):
+            reads(path, PLACE, 12000.0)
+
+
+def test_many_islands_take_no_time(tmp_path):
+    """A flat shore at sea level, with a thousand ponds of exactly 0."""
+    posts = np.random.default_rng(5).integers(-2, 3, (301, 301)).astype("int16")
+    started = time.perf_counter()
+    read_terrain(dem(tmp_path / "a.tif", posts), PLACE, 12000.0)
+    assert time.perf_counter() - started < 10
+
+
+def test_a_map_of_no_place_on_earth_is_refused(tmp_path):
+    at = rasterio.Affine(10, 0, 0, 0, -10, 0)
+    local = 'LOCAL_CS["site",UNIT["metre",1]]'
+    path = write(tmp_path / "a.tif", hills(), at, local)
+    with pytest.raises(
+        ValueError, match=r"a\.tif must have a map that shows 30\.0000, -95\.0000 deg"
+    ):
+        read_terrain(path, PLACE, 2000.0)
+    path = write(tmp_path / "b.tif", hills(), at, "EPSG:32615")
+    with pytest.raises(
+        ValueError, match=r"b\.tif must hold .* the file reaches from 0 to 3010 east"
+    ):
+        read_terrain(path, LocalMap(-17.0, 95.0), 2000.0)
 
 
 @pytest.mark.slow

@@ -203,9 +203,9 @@ def read_reference(
     with _opened(path) as dataset:
         grid = (west - half * step[0], north + half * step[1]), step, (2 * half + 1, 2 * half + 1)
         values = _warped(dataset, *grid, "bilinear")
-        low, high = (_warped(dataset, *grid, extreme) for extreme in ("min", "max"))
+        raw, low, high = _extremes(dataset, *grid)
         coarser = _pixel(dataset, scene.map) / pixel
-        void, zero = _void(dataset, low, high)
+        void, zero = _void(dataset, raw, low, high)
         declared = _declared_unit(dataset, path, unit)
     reach = int(np.ceil(coarser - 0.01)) if coarser > 0.99 else 2  # of what is averaged with a void
     values[_near(void, reach) | zero] = np.nan
@@ -221,7 +221,7 @@ def read_reference(
     if share < 0.5:
         raise ValueError(
             f"{path} must have data in half of the pixels {_around(scene.map, needed)}; found "
-            f"{100 * share:.0f} %"
+            f"{100 * share:.0f} %{_why_none(path, scene.map, needed)}"
         )
     values = np.where(np.isnan(values), np.nanmedian(values), values).astype(np.float32)
     return Reference(values, pixel, scene, None, matcher)
@@ -274,23 +274,20 @@ def _posts(path: str | Path, place: LocalMap, half_width: float, geoid: float) -
         heights = metres * _warped(dataset, corner, step, shape, "cubic")[::-1]
         around = corner[0] - _REACH * spacing, corner[1] + _REACH * spacing
         wide = shape[0] + 2 * _REACH, shape[1] + 2 * _REACH
-        low, high = (
-            metres * _warped(dataset, around, step, wide, extreme)[::-1]
-            for extreme in ("min", "max")
-        )
+        raw, low, high = (a[::-1] for a in _extremes(dataset, around, step, wide))
     south = corner[1] - (shape[0] - 1) * spacing
     inside = slice(_REACH, -_REACH), slice(_REACH, -_REACH)
     found = _Posts(heights, south, corner[0], spacing, "", (low == 0)[inside])
-    bad = (low < LOWEST) | (high > HIGHEST)
+    too_low = metres * low < LOWEST
+    bad = too_low | (metres * high > HIGHEST) | np.isin(raw, _VOIDS[:-1])
     if not bad.any():
         return found
-    first = np.argwhere(bad)[0]
-    value = low[tuple(first)] if low[tuple(first)] < LOWEST else high[tuple(first)]
+    first = tuple(np.argwhere(bad)[0])
+    value = high[first] if metres * high[first] > HIGHEST else raw[first]
     heights[_near(bad, _REACH)[inside]] = np.nan
-    others = int(bad.sum()) - 1
-    place_of = found.place(*(first - _REACH))
-    wrong = f"{value:.8g} at {place_of} and {others} other posts: {_hint(value / metres)}"
-    return found._replace(wrong=wrong)
+    at = found.place(*(np.array(first) - _REACH))
+    others = f"{int(bad.sum()) - 1} other posts"
+    return found._replace(wrong=f"{value:.8g} at {at} and {others}: {_hint(value)}")
 
 
 def _hint(value: float) -> str:
@@ -322,14 +319,15 @@ def _warn_of_odd(path: str | Path, place: LocalMap, half_width: float, posts: _P
     if posts.zero.all():
         tell("0 everywhere, as of the open sea, or of a file that was never filled")
         return
-    parts, number = ndimage.label(posts.zero)
-    for k in range(1, number + 1):
-        part = parts == k
-        shore = heights[_near(part, 3) & ~_near(posts.zero, 1)]
+    land, (parts, _) = ~_near(posts.zero, 1), ndimage.label(posts.zero)
+    for k, around in enumerate(ndimage.find_objects(parts), start=1):
+        window = tuple(slice(max(side.start - 3, 0), side.stop + 3) for side in around)
+        part = parts[window] == k
+        shore = heights[window][_near(part, 3) & land[window]]
         if shore.size and (level := np.median(shore)) > _SHORE:
             tell(
-                f"exactly 0 at {posts.place(*np.argwhere(part)[0])} and {part.sum() - 1} other "
-                f"posts, with {level:.0f} m around them: voids that are filled with 0?"
+                f"exactly 0 at {posts.place(*np.argwhere(parts == k)[0])} and {part.sum() - 1} "
+                f"other posts, with {level:.0f} m around them: voids that are filled with 0?"
             )
             return
     spacing = posts.spacing * place.metres[1]
@@ -361,11 +359,15 @@ def _in_degrees(dataset: Any) -> bool:
 def _pixel(dataset: Any, place: LocalMap) -> float:
     """The shorter side of a file's pixels at a place, m."""
     pixel, warp = dataset.transform, _rasterio("rasterio.warp")
-    at = warp.transform(WGS84, dataset.crs, [place.longitude], [place.latitude])
-    x, y = at[0][0] + np.array([0, pixel.a, pixel.b]), at[1][0] + np.array([0, pixel.d, pixel.e])
-    longitude, latitude = (np.array(a) for a in warp.transform(dataset.crs, WGS84, x, y))
-    east, north = place.position(latitude, longitude)
-    sides = np.hypot(np.diff(east[[1, 0, 2]]), np.diff(north[[1, 0, 2]]))
+    try:
+        at = warp.transform(WGS84, dataset.crs, [place.longitude], [place.latitude])
+        x = at[0][0] + np.array([0, pixel.a, pixel.b])
+        y = at[1][0] + np.array([0, pixel.d, pixel.e])
+        longitude, latitude = (np.array(a) for a in warp.transform(dataset.crs, WGS84, x, y))
+        east, north = place.position(latitude, longitude)
+        sides = np.hypot(np.diff(east[[1, 0, 2]]), np.diff(north[[1, 0, 2]]))
+    except Exception:  # GDAL's own, of no public class: there is no such transformation
+        sides = np.full(2, np.nan)
     if not (np.isfinite(sides).all() and sides.min() > 0):
         raise ValueError(
             f"{dataset.name} must have a map that shows {place.latitude:.4f}, "
@@ -380,7 +382,8 @@ def _height_unit(dataset: Any, path: str | Path) -> float:
     vertical = re.search(r'VERT(?:CRS|_CS)\[.*?(?:LENGTH)?UNIT\["([^"]+)"', wkt)
     named = [name.strip() for name in (declared, vertical[1] if vertical else "") if name.strip()]
     sizes = {name: (_METRES | _FEET).get(name.lower()) for name in named}
-    if None in sizes.values() or len(set(sizes.values())) > 1:
+    known = [size or 0.0 for size in sizes.values()]
+    if 0.0 in known or np.ptp([*known, *known[:1]] or [0.0]) > 1e-5:
         raise ValueError(
             f"{path} must hold heights in metres or feet; found the unit {' and '.join(named)}"
         )
@@ -389,7 +392,7 @@ def _height_unit(dataset: Any, path: str | Path) -> float:
             f"{path} must declare the unit of its heights, since its map is in feet; found none. "
             "`rio edit-info --bidx 1 --units foot FILE`, or `metre`, does"
         )
-    return next(iter(sizes.values()), 1.0) or 1.0
+    return next(iter(known), 1.0)
 
 
 def _check_datum(dataset: Any, path: str | Path, geoid: float) -> None:
@@ -400,7 +403,7 @@ def _check_datum(dataset: Any, path: str | Path, geoid: float) -> None:
         warnings.warn(
             f"{path}: heights count from sea level ({found[1]}), and geoid is 0; it should be the "
             "geoid's height above the ellipsoid there",
-            stacklevel=5,
+            stacklevel=4,
         )
     on_ellipsoid = bool(found and found[2] == "2002") or "CS[ellipsoidal,3]" in wkt
     if on_ellipsoid and geoid != 0:
@@ -410,17 +413,18 @@ def _check_datum(dataset: Any, path: str | Path, geoid: float) -> None:
         )
 
 
-def _void(dataset: Any, low: Array, high: Array) -> tuple[Array, Array]:
+def _void(dataset: Any, raw: Array, low: Array, high: Array) -> tuple[Array, Array]:
     """Where a pixel's part of the file holds what is no data in many files, declared or not.
 
     And where it holds nothing but 0: no measured number is that to its last digit.
     """
-    void = np.isin(low, _VOIDS) | (np.abs(low) > 1e20) | (np.abs(high) > 1e20)
+    void = np.isin(raw, _VOIDS) | (np.abs(low) > 1e20) | (np.abs(high) > 1e20)
     kind = np.dtype(dataset.dtypes[0])
     if kind.kind == "f":
         return void, (low == 0) & (high == 0)
     top = np.iinfo(kind).max
-    if kind.itemsize > 1 and (share := np.mean(high == top)) > 0.01:
+    largest = top * dataset.scales[0] + dataset.offsets[0]
+    if kind.itemsize > 1 and (share := np.mean(high == largest)) > 0.01:
         raise ValueError(
             f"{dataset.name} must declare what stands for no data; found {100 * share:.0f} % of "
             f"its pixels at {top}, the largest of {kind}: if they are void, "
@@ -511,12 +515,22 @@ def _opened(path: str | Path) -> Iterator[Any]:
         yield dataset
 
 
+def _extremes(
+    dataset: Any, corner: tuple[float, float], step: tuple[float, float], shape: tuple[int, int]
+) -> tuple[Array, Array, Array]:
+    """Of what each pixel of a grid is made from: smallest as stored; smallest, largest in units."""
+    raw, top = (_warped(dataset, corner, step, shape, name, False) for name in ("min", "max"))
+    both = [a * dataset.scales[0] + dataset.offsets[0] for a in (raw, top)]
+    return raw, np.minimum(*both), np.maximum(*both)
+
+
 def _warped(
     dataset: Any,
     corner: tuple[float, float],
     step: tuple[float, float],
     shape: tuple[int, int],
     resampling: str,
+    in_units: bool = True,
 ) -> Array:
     """Values, NaN for none, at a grid of longitudes and latitudes; rows from north to south.
 
@@ -528,7 +542,7 @@ def _warped(
         if (absent := np.isnan(values)).any():
             here = corner[0] + turn, corner[1]
             values[absent] = _warped_here(dataset, here, step, shape, resampling)[absent]
-    return values
+    return values * dataset.scales[0] + dataset.offsets[0] if in_units else values
 
 
 def _warped_here(
@@ -541,19 +555,22 @@ def _warped_here(
     transform = _rasterio("rasterio").Affine(
         step[0], 0.0, corner[0] - step[0] / 2, 0.0, -step[1], corner[1] + step[1] / 2
     )
-    with _rasterio("rasterio.vrt").WarpedVRT(
-        dataset,
-        crs=WGS84,
-        transform=transform,
-        height=shape[0],
-        width=shape[1],
-        resampling=_rasterio("rasterio.enums").Resampling[resampling],
-        dtype="float64",
-        nodata=_NOTHING,
-    ) as warped:
-        values = warped.read(1, masked=True).filled(np.nan)
-    values = np.where(np.isfinite(values), values, np.nan)
-    return values * dataset.scales[0] + dataset.offsets[0]
+    try:
+        with _rasterio("rasterio.vrt").WarpedVRT(
+            dataset,
+            crs=WGS84,
+            transform=transform,
+            height=shape[0],
+            width=shape[1],
+            resampling=_rasterio("rasterio.enums").Resampling[resampling],
+            dtype="float64",
+            nodata=_NOTHING,
+        ) as warped:
+            values = warped.read(1, masked=True).filled(np.nan)
+    except _rasterio("rasterio.errors").RasterioIOError as error:
+        why = error.__cause__ or error
+        raise OSError(f"{dataset.name} is damaged, or cut: {why}") from None
+    return np.where(np.isfinite(values), values, np.nan)
 
 
 def _rasterio(module: str) -> Any:
