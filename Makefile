@@ -21,16 +21,19 @@ export JUPYTER_CONFIG_DIR := $(CURDIR)/$(VENV)/etc/jupyter
 export IPYTHONDIR := $(CURDIR)/$(VENV)/etc/ipython
 export MPLCONFIGDIR := $(CURDIR)/$(VENV)/etc/matplotlib
 
-# An environment is made anew if its pip does not work, or if it is another folder's: moved or copied.
+# An environment is made anew if it lacks pip or a file that pip has listed (an installation that was
+# stopped), or if it is another folder's: moved or copied.
 MOVED := $(shell for f in $(VENV)/lib/python3*/site-packages/_*navfilters.pth; do \
 	test ! -f "$$f" || grep -qxF "$$(pwd -P)/lib" "$$f" || echo moved; done)
 ifneq ($(MOVED),)
 .PHONY: $(VENV)/.book
 endif
+WHOLE := import sys, importlib.metadata as m, pip._internal.cli.main; sys.exit(not all(d.files and \
+	all(f.locate().exists() for f in d.files if f.suffix != ".pyc") for d in m.distributions()))
 define made
 @$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	{ echo 'Python 3.11 or newer is needed, as in: make book PYTHON=python3.13' >&2; exit 1; }
-test -z "$(2)" && $(1)/bin/python -m pip list >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(1)
+test -z "$(2)" && $(1)/bin/python -c '$(WHOLE)' >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(1)
 endef
 
 .DEFAULT_GOAL := help

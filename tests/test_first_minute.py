@@ -16,10 +16,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-pytestmark = pytest.mark.skipif(
-    sys.platform == "win32" or shutil.which("make") is None, reason="needs make and a POSIX shell"
-)
-
 SAYS = """\
 #!/bin/sh
 echo "$(basename "$0") $*"
@@ -45,6 +41,8 @@ def script(path, text):
 @pytest.fixture(params=["checkout", "my räume (1)"])
 def checkout(tmp_path, request):
     """A copy with stubs for tools, ready to be used; also in a folder with an odd name."""
+    if sys.platform == "win32" or shutil.which("make") is None:
+        pytest.skip("needs make and a POSIX shell")
     folder = tmp_path / request.param
     folder.mkdir()
     shutil.copy(ROOT / "Makefile", folder)
@@ -137,6 +135,24 @@ def test_a_half_made_environment_is_made_anew(checkout, state):
     assert code == 0, err
     assert made == ["venv -m venv --clear .venv"]
     assert (checkout / ".venv/.book").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("state", ["whole", "no record", "a file is missing"])
+@pytest.mark.parametrize("checkout", ["my räume (1)"], indirect=True)
+def test_an_installation_that_was_stopped_is_made_anew(working, state):
+    """Or pip would take a package that is there in part for one that is there."""
+    pytest.importorskip("pip")
+    packages = next((working / ".venv/lib").glob("python3*/site-packages"))
+    about = packages / "half-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: half\nVersion: 1.0\n")
+    if state != "no record":
+        (about / "RECORD").write_text("half-1.0.dist-info/METADATA,,\nhalf.py,,\n")
+    if state == "whole":
+        (packages / "half.py").touch()
+    _, made, _, _ = remade(working)
+    assert bool(made) == (state != "whole")
 
 
 @pytest.mark.parametrize("moved", [False, True])
