@@ -6,11 +6,11 @@ antenna frame s has its third axis along the boresight. Latitude and longitude a
 degrees; every other angle is in radians. Geodetic coordinates need pymap3d.
 """
 
-import importlib
 from typing import Any
 
 import numpy as np
 
+from navfilters._extras import needed
 from navfilters.types import Array
 
 SEMI_MAJOR = 6378137.0
@@ -227,12 +227,7 @@ def ecef_to_geodetic(r: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _pymap3d() -> Any:
-    try:
-        return importlib.import_module("pymap3d")
-    except ImportError:
-        raise ImportError(
-            "geodetic coordinates need pymap3d: pip install navfilters[sar]"
-        ) from None
+    return needed("pymap3d", "navfilters[sar]", "geodetic arithmetic")
 
 
 def _unit(v: Array) -> Array:

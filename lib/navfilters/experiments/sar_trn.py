@@ -13,6 +13,7 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 from navfilters import validation
+from navfilters._extras import command
 from navfilters._progress import progress as progress_bar
 from navfilters.attitude import (
     conjugate,
@@ -678,6 +679,11 @@ def _add_product(parser: argparse.ArgumentParser) -> None:
         "--reference", metavar="FILE", help="GeoTIFF of a geocoded, terrain-corrected SAR image"
     )
     group.add_argument(
+        "--reference-unit",
+        choices=["dB", "linear"],
+        help="of that image, where neither its band nor its pixels tell",
+    )
+    group.add_argument(
         "--geoid",
         metavar="METRES",
         type=float,
@@ -728,7 +734,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     _add_product(parser)
     chosen = parser.parse_args(arguments)
-    options = ("dem", "reference", "geoid", "polarisation", "records", "clock_offset")
+    options = (
+        "dem",
+        "reference",
+        "reference_unit",
+        "geoid",
+        "polarisation",
+        "records",
+        "clock_offset",
+    )
     given = [name for name in options if getattr(chosen, name) is not None]
     if chosen.palsar is None and given:
         parser.error(f"--{given[0].replace('_', '-')} must come with --palsar")
@@ -759,6 +773,7 @@ def _on_product(chosen: argparse.Namespace) -> str:
             chosen.runs,
             chosen.seed,
             geoid=chosen.geoid or 0.0,
+            unit=chosen.reference_unit,
             polarisation=chosen.polarisation,
             records=chosen.records,
             clock_offset=chosen.clock_offset or 0.0,
@@ -769,4 +784,4 @@ def _on_product(chosen: argparse.Namespace) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

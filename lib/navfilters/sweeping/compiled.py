@@ -4,11 +4,16 @@ import threading
 from functools import lru_cache
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
+from navfilters._extras import missing
 from navfilters.sweeping.chunks import Job, Kept, March, Row
+
+try:
+    import jax
+    import jax.numpy as jnp
+except ImportError as error:
+    raise missing("jax", "navfilters[jax]", 'engine="jax"', error) from None
 
 BLOCK = 512
 """Members that a processor's core takes through all steps at once: their arrays stay in its cache,

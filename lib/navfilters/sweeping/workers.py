@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator
 from itertools import islice
 from typing import Any
 
+from navfilters._extras import needed
+
 Call = Callable[[Any], Any]
 
 
@@ -15,15 +17,12 @@ def in_turn(call: Call, tasks: Iterator) -> Iterator:
 
 def on_cores(call: Call, tasks: Iterator, workers: int, *, threads: bool) -> Iterator:
     """In so many processes or threads; a few tasks at a time are taken from the iterator."""
-    try:
-        from joblib import Parallel, delayed
-    except ImportError:
-        raise ImportError("workers need joblib: pip install navfilters[sweep]") from None
+    joblib = needed("joblib", "navfilters[sweep]", "a sweep with workers")
     options: dict[str, Any] = {"backend": "threading"}
     if not threads:
         options = {"backend": "loky", "max_nbytes": None, "initializer": _leave_ctrl_c_to_parent}
-    pool = Parallel(workers, return_as="generator_unordered", batch_size=1, **options)
-    return pool(delayed(call)(task) for task in tasks)
+    pool = joblib.Parallel(workers, return_as="generator_unordered", batch_size=1, **options)
+    return pool(joblib.delayed(call)(task) for task in tasks)
 
 
 def _leave_ctrl_c_to_parent() -> None:
@@ -33,8 +32,8 @@ def _leave_ctrl_c_to_parent() -> None:
 
 def on_cluster(call: Call, tasks: Iterator, client: Any) -> Iterator:
     """On a dask cluster. What a lost worker had is computed again by another."""
-    import dask
-    from distributed import as_completed
+    dask = needed("dask", "navfilters[cluster]", "a sweep on a cluster")
+    as_completed = needed("distributed", "navfilters[cluster]", "a sweep on a cluster").as_completed
 
     def submit(task):
         # A task carries its own configurations, so that no worker's loss takes them along.
