@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters.derivatives import check_model, complex_step, jacobian, probe
+from navfilters.derivatives import check_model, complex_step, jacobian
+from navfilters.probing import probe
 
 jax.config.update("jax_enable_x64", True)
 

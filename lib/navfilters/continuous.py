@@ -13,7 +13,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from navfilters import validation
-from navfilters.derivatives import check_model, jacobian, probe
+from navfilters.derivatives import check_model, jacobian
+from navfilters.probing import probe
 from navfilters.types import Array, Gaussian
 
 Signal = Callable[[float], Array]

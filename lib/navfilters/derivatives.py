@@ -133,39 +133,3 @@ def check_model(model: Any, functions: tuple[str, ...], derivatives: tuple[str, 
         if value.ndim != 2:
             raise ValueError(f"{name} must have shape (n, n); found {value.shape}")
         object.__setattr__(model, name, value)
-
-
-def probe(name: str, function: Callable, arguments: tuple, core: tuple[int, ...]) -> np.ndarray:
-    """Call a model's function once, before anything is computed with it, and look at what it gives.
-
-    Parameters
-    ----------
-    name : str
-        What to call function in an error.
-    function : callable
-    arguments : tuple
-        What to call it with.
-    core : tuple of int
-        The trailing axes that its value must have.
-
-    Returns
-    -------
-    ndarray (..., core)
-
-    Raises
-    ------
-    ValueError
-        The call fails on arguments of these sizes, or its value has another shape or is not finite.
-    TypeError
-        As of :func:`complex_step`.
-    """
-    shapes = ", ".join(str(np.shape(a)) for a in arguments)
-    needed = f"{name} must return shape (..., {', '.join(map(str, core))}) from shapes {shapes}"
-    try:
-        value = function(*arguments)
-    except (ValueError, IndexError, AttributeError) as error:
-        raise ValueError(f"{needed}; found {type(error).__name__}: {error}") from error
-    value = validation.real_array(f"the value of {name}", value, "")
-    if value.shape[value.ndim - len(core) :] != core or value.ndim < len(core):
-        raise ValueError(f"{needed}; found {value.shape}")
-    return value

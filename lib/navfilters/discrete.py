@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from navfilters import validation
-from navfilters.derivatives import check_model, jacobian, probe
+from navfilters.derivatives import check_model, jacobian
 from navfilters.filters import kalman_update
+from navfilters.probing import probe
 from navfilters.types import Array, Gaussian, Moments
 
 

@@ -15,6 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from navfilters import validation
 from navfilters.linalg import matmul, right_divide, spectral_norm
 from navfilters.moments import linearized, second_order, unscented
 from navfilters.types import Array, Gaussian, MeasurementModel, Moments
@@ -41,6 +42,11 @@ def kalman_update(prior: Gaussian, z: Array, moments: Moments) -> Gaussian:
     Gaussian
         The updated mean and covariance. Not finite where P_zz is singular.
 
+    Raises
+    ------
+    ValueError
+        Trailing axes that do not fit together, or a z whose meaning is more than its numbers.
+
     Notes
     -----
     K P_xz^T is symmetric, but its rounding is not. Early rounding stays in P while P shrinks by ten
@@ -50,6 +56,12 @@ def kalman_update(prior: Gaussian, z: Array, moments: Moments) -> Gaussian:
     ----------
     perea2007, Eqs. (5)-(7).
     """
+    z = validation.given("z", z)
+    n, m = prior.mean.shape[-1], z.shape[-1]
+    validation.core("prior.cov", prior.cov, (n, n))
+    validation.core("the expected measurement, from model.h,", moments.z_hat, (m,))
+    validation.core("its covariance, from model.R,", moments.P_zz, (m, m))
+    validation.core("P_xz, from model.jacobian or model.h,", moments.P_xz, (n, m))
     K = right_divide(moments.P_xz, moments.P_zz)
     mean = prior.mean + matmul(K, (z - moments.z_hat)[..., None])[..., 0]
     reduction = matmul(K, moments.P_xz.mT)
@@ -245,8 +257,10 @@ def _add_noise(moments: Moments, extra: Array) -> Moments:
 
 
 def _per_member(like: Array, value: Array) -> Array:
-    if isinstance(value, int | float | np.ndarray) and not np.all(np.asarray(value) >= 0):
-        raise ValueError(f"bump must be at least 0; found {np.min(value)}")
+    if not validation.traced(value):
+        value = validation.real_array("bump", value, "", finite=False)
+        if not (value >= 0).all():
+            raise ValueError(f"bump must be at least 0; found {np.min(value)}")
     return like.__array_namespace__().asarray(value)[..., None, None]
 
 
@@ -309,10 +323,13 @@ class Filter:
         Returns
         -------
         Gaussian
-            The updated state. Shapes and values are not checked here; ``run`` does.
+            The updated state. Of arrays only their kind and their trailing axes are checked here;
+            ``run`` checks their values and the model.
 
         Raises
         ------
+        ValueError
+            Masked entries, units, no numbers, trailing axes that do not fit together.
         TypeError
             An option that this filter does not have.
         """
@@ -320,6 +337,9 @@ class Filter:
         if unknown:
             has = ", ".join(self.options) or "none"
             raise TypeError(f"unknown options {sorted(unknown)}; this filter has {has}")
+        prior = Gaussian(
+            validation.given("prior.mean", prior.mean), validation.given("prior.cov", prior.cov)
+        )
         moments = self.moments(prior, model, **_accepted(self.moments, options))
         changed, moments = self.variant(prior, model, moments, **_accepted(self.variant, options))
         return kalman_update(changed, z, moments)

@@ -36,6 +36,7 @@ def linearized(prior: Gaussian, model: MeasurementModel) -> Moments:
     perea2007, Eqs. (10)-(12).
     """
     H = model.jacobian(prior.mean)
+    validation.core("model.jacobian", H, (np.shape(model.R)[-1], prior.mean.shape[-1]))
     P_xz = matmul(prior.cov, H.mT)
     return Moments(model.h(prior.mean), model.R + matmul(H, P_xz), P_xz)
 
@@ -91,7 +92,11 @@ def second_order_bias(prior: Gaussian, model: MeasurementModel) -> Array:
     ----------
     perea2007, the definition below Eq. (20).
     """
-    products = model.hessian(prior.mean) * prior.cov[..., None, :, :]
+    n = prior.mean.shape[-1]
+    hessian = validation.core(
+        "model.hessian", model.hessian(prior.mean), (np.shape(model.R)[-1], n, n)
+    )
+    products = hessian * prior.cov[..., None, :, :]
     xp = products.__array_namespace__()
     return xp.sum(products, axis=(-2, -1)) / 2
 
@@ -152,8 +157,7 @@ class SigmaPoints:
         """
         xp = np if xp is None else xp
         given = 3.0 - n if self.kappa is None else self.kappa
-        known = isinstance(given, int | float | list | tuple | np.ndarray)  # not so while compiling
-        if known and np.any(n + np.asarray(given) <= 0):
+        if not validation.traced(given) and np.any(n + np.asarray(given) <= 0):
             raise ValueError(
                 f"kappa must be larger than {-n} for a state of size {n}; found {given}"
             )
@@ -225,7 +229,7 @@ def unscented(
     xp = X.__array_namespace__()
     missing = model.R.ndim - X.ndim  # batch axes that only the model has go behind the points' axis
     X = xp.reshape(X, (X.shape[0], *(1,) * missing, *X.shape[1:]))
-    Z = model.h(X)
+    Z = validation.core("model.h", model.h(X), (model.R.shape[-1],))
     _, _, W0_c, W_i = points.weights(prior.mean.shape[-1], xp)
     # The weights sum to one. Summing differences keeps the digits that a large negative W0 would
     # cancel.

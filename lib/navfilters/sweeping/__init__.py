@@ -10,6 +10,7 @@ from contextlib import closing, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
+from uuid import uuid4
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from navfilters import validation
 from navfilters.sweeping import workers as places
 from navfilters.sweeping.checkpoints import Checkpoint
 from navfilters.sweeping.chunks import Chunk, Job, Kept, SweepError, compute
-from navfilters.sweeping.problems import WORTH_A_PROCESS, Problem
+from navfilters.sweeping.problems import WORTH_A_PROCESS, Problem, probe_models
 from navfilters.sweeping.trees import flatten, unflatten
 from navfilters.types import Gaussian
 
@@ -161,15 +162,14 @@ def sweep(
     kinds = _keep(keep, truth)
     if engine not in ("numpy", "jax"):
         raise ValueError(f"engine must be 'numpy' or 'jax'; found {engine!r}")
-    for name, value in (("workers", workers), ("chunk", chunk)):
-        if value is not None:
-            validation.whole_number(name, value, 1)
-
+    z_varies = validation.flag("z_varies", z_varies)
+    workers, chunk = (
+        None if value is None else validation.whole_number(name, value, 1)
+        for name, value in (("workers", workers), ("chunk", chunk))
+    )
     problem = Problem.of(estimator, priors, z, model, truth, steps, z_varies)
-    job = Job(engine, problem.tree, problem.axes, problem.grid, steps, kinds, z_varies)
-    # One step of the first configuration: what a chunk's result will look like.
-    probe = replace(job, engine="numpy", steps=min(steps, 1))
-    results = _Results(compute(probe, problem.chunk(0, 1)), problem.count, steps)
+    job = Job(engine, problem.tree, problem.axes, problem.grid, steps, kinds, z_varies, uuid4().hex)
+    results = _Results(_probe(job, problem), problem.count, steps)
     size = min(chunk, problem.count) if chunk else problem.size(steps, results.series_bytes)
     if engine == "jax":
         from navfilters.sweeping.compiled import whole_blocks
@@ -193,6 +193,23 @@ def _keep(keep: Collection[str], truth: Any) -> tuple[str, ...]:
             f"{keep!r}"
         )
     return tuple(name for name in KEEP if name in keep)
+
+
+def _probe(job: Job, problem: Problem) -> Kept:
+    """One step of the first configuration, once its model is known to be sound."""
+    one = replace(job, engine="numpy", steps=min(job.steps, 1))
+    with _doubles(job.engine):
+        probe_models(one, problem)
+        return compute(one, problem.chunk(0, 1))
+
+
+def _doubles(engine: str) -> Any:
+    """Where JAX's arrays are as they will be when it computes."""
+    if engine == "numpy":
+        return nullcontext()
+    import jax
+
+    return jax.enable_x64(True)
 
 
 def _place(job: Job, problem: Problem, client: Any, workers: int | None) -> Callable[..., Iterator]:
@@ -223,6 +240,7 @@ class _Results:
 
     def __init__(self, like: Kept, count: int, steps: int) -> None:
         self.tree, leaves = flatten("kept", like, None)
+        self.leaves = leaves
         self.axes = [int(leaf.name.startswith("kept.rows")) for leaf in leaves]
         single = [leaf.array.shape[i] == 1 for leaf, i in zip(leaves, self.axes, strict=True)]
         if not (all(single) and self.tree.only_arrays):
@@ -236,6 +254,7 @@ class _Results:
             for leaf, i in zip(leaves, self.axes, strict=True)
         ]
         self.count, self.finished = count, 0
+        self.missing: set[int] = set()
 
     @property
     def series_bytes(self) -> int:
@@ -244,24 +263,48 @@ class _Results:
         return sum(rows) // self.count
 
     def put(self, chunk: Chunk, kept: Kept) -> int:
-        """Fill in a chunk; how many members that are."""
-        _, leaves = flatten("kept", kept, None)
+        """Fill in a chunk, whose results must be what the first configuration's are."""
+        tree, leaves = flatten("kept", kept, None)
         first = int(chunk.members[0])
         members = int(chunk.members[-1]) + 1 - first
+        found = {leaf.name: (leaf.array.shape, leaf.array.dtype) for leaf in leaves}
+        wanted = {
+            leaf.name: ((*a.shape[:i], len(chunk.members), *a.shape[i + 1 :]), a.dtype)
+            for leaf, a, i in zip(self.leaves, self.arrays, self.axes, strict=True)
+        }
+        if tree != self.tree or found != wanted:
+            raise SweepError(
+                f"chunk {chunk.number}, configurations {first} to {first + members - 1}: estimator "
+                f"must return arrays of shapes and types {_shown(wanted)}, as of the first "
+                f"configuration; found {_shown(found)}"
+            )
         for array, leaf, i in zip(self.arrays, leaves, self.axes, strict=True):
             lead = (slice(None),) * i
             array[(*lead, slice(first, first + members))] = leaf.array[(*lead, slice(members))]
         self.finished += members
+        self.missing.discard(chunk.number)
         return members
 
     def collect(self, batch: tuple[int, ...]) -> Sweep:
-        """The result, with the batch axes of the sweep."""
+        """The result, with the batch axes of the sweep; SweepError while a chunk is missing."""
+        if self.missing:
+            first = sorted(self.missing)[:9]
+            raise SweepError(
+                f"sweep must have every chunk; found {len(self.missing)} that never arrived: "
+                f"{', '.join(map(str, first))}{', ...' * (len(self.missing) > 9)}"
+            )
         shaped = [
             a.reshape((*a.shape[:i], *batch, *a.shape[i + 1 :]))
             for a, i in zip(self.arrays, self.axes, strict=True)
         ]
         kept = unflatten(self.tree, shaped)
         return Sweep(kept.final, kept.indefinite, kept.rows.error, kept.rows.history)
+
+
+def _shown(kept: dict[str, tuple]) -> str:
+    return ", ".join(
+        f"{name.removeprefix('kept.')} {shape} {dtype}" for name, (shape, dtype) in kept.items()
+    )
 
 
 def _numbered(job: Job, chunk: Chunk) -> tuple[int, Kept]:
@@ -291,6 +334,7 @@ def _fill(results, job, problem, size, store, place, progress) -> None:
     """Load the chunks that are stored and compute the others."""
     with _bar(problem.count, progress) as bar:
         missing = []
+        results.missing = set(range(-(-problem.count // size)))
         for number in range(-(-problem.count // size)):
             kept = store.load(number) if store else None
             if kept is None:
