@@ -46,7 +46,7 @@ def complex_step(
     sqrt(x @ x) for the norm, and compare a new f once with differences.
     """
     name = name or getattr(f, "__qualname__", repr(f))
-    x = np.asarray(x)
+    x = np.asarray(validation.plain("x", x))
     if x.dtype.kind not in "iuf" or x.ndim == 0:
         raise ValueError(f"x must be a real array (..., n); found {x.dtype}, shape {x.shape}")
     columns = []
@@ -54,7 +54,7 @@ def complex_step(
         z = x.astype(complex)
         z[..., j] += 1j * step
         try:
-            value = np.asarray(f(z))
+            value = np.asarray(validation.plain(f"the value of {name}", f(z)))
         except (TypeError, np.exceptions.ComplexWarning) as error:
             raise TypeError(
                 f"{name} must accept complex numbers for its Jacobian by complex step; found "

@@ -58,9 +58,7 @@ def probe(
         As of :func:`~navfilters.derivatives.complex_step`.
     """
     shapes = ", ".join(str(np.shape(a)) for a in arguments)
-    lead = ["..."] if batch is None else list(map(str, batch))
-    wanted = ", ".join([*lead, *map(str, core)]) + "," * (len(lead) + len(core) == 1)
-    needed = f"{name} must return shape ({wanted}) from shapes {shapes}"
+    needed = f"{name} must return shape (..., {', '.join(map(str, core))}) from shapes {shapes}"
     try:
         value = function(*map(_unwritable, arguments))
     except (ValueError, IndexError, AttributeError) as error:
@@ -74,13 +72,68 @@ def probe(
     if batch is not None and not (
         _broadcasts(found[:size], batch) and _broadcasts(least, found[:size])
     ):
-        raise ValueError(f"{needed}; found {found}")
+        whole = f"{name} must return shape {(*batch, *core)} from shapes {shapes}"
+        raise ValueError(f"{whole}; found {found}")
     if getattr(value, "dtype", np.float64) in (np.float32, np.float16):
         raise ValueError(
             f"{name} must return doubles; found {value.dtype} (JAX computes in doubles after "
             "jax.config.update('jax_enable_x64', True))"
         )
     return array
+
+
+def members(
+    name: str,
+    function: Callable,
+    arguments: tuple,
+    states: int,
+    core: tuple[int, ...],
+    batch: tuple[int, ...],
+    own: tuple[int, ...] = (),
+    *,
+    whole: bool,
+    finite: bool = True,
+) -> np.ndarray:
+    """Call a function for a whole batch, and for its first and its last member alone.
+
+    Parameters
+    ----------
+    name : str
+        What to call function in an error.
+    function : callable
+    arguments : tuple
+        What to call it with.
+    states : int
+        How many of them, from the first, are vectors (..., n) with batch axes.
+    core : tuple of int
+        The trailing axes that its value must have.
+    batch : tuple of int
+        Those in front of them.
+    own : tuple of int
+        Those that the function has whatever its arguments: the last of the batch.
+    whole : bool
+        Whether all batch axes of the states must be in the value; otherwise they may be missing.
+    finite : bool
+        False where NaN and infinity are no error.
+
+    Returns
+    -------
+    ndarray (..., core)
+
+    Raises
+    ------
+    ValueError
+        As of :func:`probe`, and a value that changes with the other members.
+    """
+    lead = np.broadcast_shapes(*(a.shape[:-1] for a in arguments[:states]))
+    least = lead if whole else ()
+    together = probe(name, function, arguments, core, batch, least=least, finite=finite)
+    for corner in (0, -1) if lead and 0 not in batch else ():
+        index = tuple(corner % size for size in batch)
+        one = (*(_member(a, index, 1) for a in arguments[:states]), *arguments[states:])
+        alone = probe(name, function, one, core, own, finite=finite)
+        _same(name, _member(together, index, len(core)), _member(alone, index, len(core)))
+    return together
 
 
 def measurements(
@@ -210,7 +263,7 @@ def dynamics(model: Any, mean: np.ndarray, *, name: str) -> None:
 
 
 def _state_size(model: MeasurementModel, mean: np.ndarray, m: int) -> int | None:
-    """The n of a jacobian (..., m, n), if it can be had: to say that the state is another model's."""
+    """The n of a jacobian (..., m, n), if it can be had: the state may be another model's."""
     try:
         with np.errstate(all="ignore"):
             found = np.shape(model.jacobian(_unwritable(_first(mean))))
@@ -234,23 +287,16 @@ def _alike(
     whole: bool,
 ) -> None:
     """One state, several in front of the model's own batch axes, and, but for a Hessian, all."""
+    options: dict[str, Any] = {"whole": whole, "finite": False}
     one = _first(x)
     count = 1 + sum(core) + one.size  # no other axis is as long
     near = 1 + 2.0**-10 * np.arange(count)
     several = (near[:, None] * one).reshape(count, *(1,) * len(own), -1)
     with np.errstate(all="ignore"):
-        first = probe(name, function, (one,), core, own, finite=False)
+        probe(name, function, (one,), core, own, finite=False)
         for states in [several, x] if x.size and x.ndim > 1 and len(core) < 3 else [several]:
-            lead = states.shape[:-1]
-            batch = np.broadcast_shapes(lead, own)
-            least = lead if whole else ()
-            together = probe(name, function, (states,), core, batch, least=least, finite=False)
-            for corner in (0, -1):
-                index = tuple(corner % size for size in batch)
-                state, alone = _member(states, index, 1), first
-                if corner:
-                    alone = probe(name, function, (state,), core, own, finite=False)
-                _same(name, _member(together, index, len(core)), _member(alone, index, len(core)))
+            batch = np.broadcast_shapes(states.shape[:-1], own)
+            members(name, function, (states,), 1, core, batch, own, **options)
 
 
 def _member(array: np.ndarray, index: tuple[int, ...], axes: int) -> np.ndarray:

@@ -207,7 +207,12 @@ def whole_number(name: str, value: Any, least: int) -> int:
 
 
 def number(
-    name: str, value: Any, *, above: float = -np.inf, least: float = -np.inf, below: float = np.inf
+    name: str,
+    value: Any,
+    *,
+    above: float = -np.inf,
+    least: float = -np.inf,
+    needed: str = "a finite real number",
 ) -> float:
     """One real number.
 
@@ -217,8 +222,10 @@ def number(
         The argument, as the caller knows it.
     value : float
         Also an int, NumPy's numbers, and an array without axes.
-    above, least, below : float
-        It must be larger than above, at least least, and smaller than below.
+    above, least : float
+        It must be larger than above and at least least.
+    needed : str
+        What to call such a number in an error.
 
     Returns
     -------
@@ -229,18 +236,12 @@ def number(
     ValueError
         Not one number, not finite, or out of range; a bool is no number.
     """
-    needed = "a finite real number"
-    limits = ((">", above), (">=", least), ("<", below))
-    asked = " and ".join(f"{sign} {limit:g}" for sign, limit in limits if np.isfinite(limit))
-    if asked:
-        needed = f"{needed} {asked}"
     try:
         array = real_array(name, value, "")
-        ok = array.ndim == 0 and array > above and array >= least and array < below
     except ValueError:
-        plain(name, value)
-        ok = False
-    if not ok:
+        plain(name, value)  # what this refuses has a cure of its own
+        array = np.zeros(1)
+    if array.ndim or array <= above or array < least:
         raise ValueError(f"{name} must be {needed}; found {value!r}")
     return float(array)
 

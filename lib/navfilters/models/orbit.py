@@ -185,11 +185,11 @@ class Orbit:
         if self.integrator not in INTEGRATORS:
             known = sorted(INTEGRATORS)
             raise ValueError(f"integrator must be one of {known}; found {self.integrator!r}")
-        if not (np.isfinite(self.step) and self.step > 0):
-            raise ValueError(f"step must be a positive number of seconds; found {self.step}")
-        substeps = self.substeps
-        if isinstance(substeps, bool) or not isinstance(substeps, int | np.integer) or substeps < 1:
-            raise ValueError(f"substeps must be an integer of at least 1; found {substeps!r}")
+        seconds = "a positive number of seconds"
+        step = validation.number("step", self.step, above=0, needed=seconds)
+        object.__setattr__(self, "step", step)
+        substeps = validation.whole_number("substeps", self.substeps, 1)
+        object.__setattr__(self, "substeps", substeps)
         Q = np.zeros((6, 6)) if self.Q is None else self.Q
         object.__setattr__(self, "Q", validation.covariance("Q", Q, 6, definite=False))
 

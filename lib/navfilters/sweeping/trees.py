@@ -263,7 +263,8 @@ def _grow(tree: Tree, arrays: Iterator[Any]) -> Any:
     if issubclass(tree.kind, tuple):
         size = len(getattr(tree.kind, "_fields", parts))
         kind = tree.kind if hasattr(tree.kind, "_fields") else tuple
-        value, named = tuple.__new__(kind, parts[:size]), named[size:]
+        value: Any = tuple.__new__(kind, parts[:size])
+        named = named[size:]
     elif issubclass(tree.kind, SimpleNamespace):
         value = tree.kind()
     else:
