@@ -17,7 +17,7 @@ import numpy as np
 
 from navfilters import validation
 from navfilters.linalg import matmul, right_divide, spectral_norm
-from navfilters.moments import linearized, second_order, unscented
+from navfilters.moments import linearized, noise, second_order, unscented
 from navfilters.types import Array, Gaussian, MeasurementModel, Moments
 
 Variant = Callable[..., tuple[Gaussian, Moments]]
@@ -142,7 +142,7 @@ def bump_predicted(
     ----------
     perea2007, section VI.A.1 (B-UKF).
     """
-    spread = moments.P_zz - model.R
+    spread = moments.P_zz - noise(model)
     return prior, _add_noise(moments, _per_member(spread, bump) * spread)
 
 
@@ -198,10 +198,11 @@ def bump_equivalent(prior: Gaussian, model: MeasurementModel, moments: Moments):
             "B-EKF 3 inverts the measurement function, so model must measure as many components as "
             f"the state has; found {m} measurements of {n} states"
         )
-    J_R = right_divide(model.R, H.mT).mT  # H^-1 R, R being symmetric
+    R = noise(model)
+    J_R = right_divide(R, H.mT).mT  # H^-1 R, R being symmetric
     in_state_space = right_divide(J_R, H.mT)
     R_new = spectral_norm(in_state_space)[..., None, None] * matmul(H, H.mT)
-    return prior, _add_noise(moments, R_new - model.R)
+    return prior, _add_noise(moments, R_new - R)
 
 
 def bump_state(prior: Gaussian, model: MeasurementModel, moments: Moments):
@@ -227,7 +228,7 @@ def bump_state(prior: Gaussian, model: MeasurementModel, moments: Moments):
     xp = H.__array_namespace__()
     size = spectral_norm(prior.cov)[..., None, None]
     P_new = size * xp.eye(H.shape[-1])
-    moments = Moments(moments.z_hat, model.R + size * matmul(H, H.mT), size * H.mT)
+    moments = Moments(moments.z_hat, noise(model) + size * matmul(H, H.mT), size * H.mT)
     return Gaussian(prior.mean, P_new), moments
 
 

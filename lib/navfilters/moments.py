@@ -36,9 +36,30 @@ def linearized(prior: Gaussian, model: MeasurementModel) -> Moments:
     perea2007, Eqs. (10)-(12).
     """
     H = model.jacobian(prior.mean)
-    validation.core("model.jacobian", H, (np.shape(model.R)[-1], prior.mean.shape[-1]))
+    R = noise(model)
+    validation.core("model.jacobian", H, (R.shape[-1], prior.mean.shape[-1]))
     P_xz = matmul(prior.cov, H.mT)
-    return Moments(model.h(prior.mean), model.R + matmul(H, P_xz), P_xz)
+    return Moments(model.h(prior.mean), R + matmul(H, P_xz), P_xz)
+
+
+def noise(model: MeasurementModel) -> Array:
+    """A model's R, if it is one: a vector or a number would be added to every row.
+
+    Parameters
+    ----------
+    model : MeasurementModel
+
+    Returns
+    -------
+    array (..., m, m)
+
+    Raises
+    ------
+    ValueError
+        Another shape, no real numbers, masked entries or a unit.
+    """
+    R = validation.given("model.R", model.R)
+    return validation.core("model.R", R, R.shape[-1:] * 2 or (1, 1))
 
 
 def second_order(prior: Gaussian, model: MeasurementModel) -> Moments:
@@ -93,9 +114,8 @@ def second_order_bias(prior: Gaussian, model: MeasurementModel) -> Array:
     perea2007, the definition below Eq. (20).
     """
     n = prior.mean.shape[-1]
-    hessian = validation.core(
-        "model.hessian", model.hessian(prior.mean), (np.shape(model.R)[-1], n, n)
-    )
+    m = np.shape(model.R)[-1]
+    hessian = validation.core("model.hessian", model.hessian(prior.mean), (m, n, n))
     products = hessian * prior.cov[..., None, :, :]
     xp = products.__array_namespace__()
     return xp.sum(products, axis=(-2, -1)) / 2
@@ -227,14 +247,15 @@ def unscented(
     """
     X = sigma_points(prior, points)
     xp = X.__array_namespace__()
-    missing = model.R.ndim - X.ndim  # batch axes that only the model has go behind the points' axis
+    R = noise(model)
+    missing = R.ndim - X.ndim  # batch axes that only the model has go behind the points' axis
     X = xp.reshape(X, (X.shape[0], *(1,) * missing, *X.shape[1:]))
-    Z = validation.core("model.h", model.h(X), (model.R.shape[-1],))
+    Z = validation.core("model.h", model.h(X), R.shape[-1:])
     _, _, W0_c, W_i = points.weights(prior.mean.shape[-1], xp)
     # The weights sum to one. Summing differences keeps the digits that a large negative W0 would
     # cancel.
     z_hat = Z[0] + W_i[..., None] * xp.sum(Z[1:] - Z[0], axis=0)
     dX, dZ = X - prior.mean, Z - z_hat
     W0_c, W_i = W0_c[..., None, None], W_i[..., None, None]
-    P_zz = model.R + W0_c * outer_sum(dZ[:1], dZ[:1]) + W_i * outer_sum(dZ[1:], dZ[1:])
+    P_zz = R + W0_c * outer_sum(dZ[:1], dZ[:1]) + W_i * outer_sum(dZ[1:], dZ[1:])
     return Moments(z_hat, P_zz, W_i * outer_sum(dX[1:], dZ[1:]))

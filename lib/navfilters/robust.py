@@ -68,7 +68,8 @@ def _spread(estimate: Gaussian, F: Array, dynamics: Dynamics, Q: Array) -> Array
     square = estimate.mean.shape[-1:] * 2
     validation.core("F of dynamics.transition", F, square)
     Q = Q if accumulate is None else accumulate(Q, estimate.mean)
-    P = F @ estimate.cov @ F.mT + validation.core("dynamics.Q", Q, square)
+    Q = validation.core("dynamics.Q", validation.given("dynamics.Q", Q), square)
+    P = F @ estimate.cov @ F.mT + Q
     return (P + P.mT) / 2
 
 

@@ -43,11 +43,14 @@ def given(name: str, value: Any) -> Any:
     Raises
     ------
     ValueError
-        As of :func:`real_array`, but a plain array is not looked into.
+        As of :func:`real_array`, but of a plain array only the type of its elements is looked at.
     """
     if type(value) is np.ndarray:
-        return value
-    if hasattr(value, "__array_namespace__") and not isinstance(value, np.ndarray | np.generic):
+        known = True
+    else:
+        known = hasattr(value, "__array_namespace__")
+        known = known and not isinstance(value, np.ndarray | np.generic)
+    if known and value.dtype.kind in "fiu":
         return value
     return real_array(name, value, "", finite=False)
 

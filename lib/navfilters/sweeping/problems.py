@@ -180,6 +180,8 @@ def probe_models(job: Job, problem: Problem) -> None:
                 probing.dynamics(dynamics, mean, name="model[0]")
             probing.sensor(sensor, mean, name="priors")
         except ValueError as error:
+            if not any(leaf.core and leaf.name.startswith("model") for leaf in problem.leaves):
+                raise
             raise ValueError(
                 f"{error}. (In a sweep a model's arrays that differ between configurations are "
                 "fields of a dataclass, not in a closure, and those that are no matrices say so: "
