@@ -1,4 +1,4 @@
-"""Arrays that are more than their numbers are refused by name, at every door where arrays come in."""
+"""Arrays that are more than their numbers are refused by name, wherever arrays come in."""
 
 import warnings
 from dataclasses import dataclass

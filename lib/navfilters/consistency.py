@@ -249,7 +249,8 @@ def coverage(error: Any, cov: Any, k: float = 3.0, confidence: float = 0.95) -> 
         not fit.
     """
     tail = _tail(confidence)
-    if validation.number("k", k) <= 0:
+    k = validation.number("k", k)
+    if k <= 0:
         raise ValueError(f"k must be a positive number of deviations; found {k}")
     error, cov = _runs(error, cov)
     used = np.isfinite(error).all(-1) & np.isfinite(cov).all((-2, -1))

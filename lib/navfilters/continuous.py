@@ -191,7 +191,8 @@ def linearized_kalman_bucy(
     ----------
     lecture16, Eqs. (5)-(30).
     """
-    t, prior, y, y0 = _door(system, prior, y, t, rtol, atol)
+    t, prior, y, y0 = _door(system, prior, y, t)
+    rtol, atol = _tolerances(rtol, atol)
     if not (np.ndim(residual_tol) == 0 and residual_tol == np.inf):
         validation.number("residual_tol", residual_tol, least=0, needed="a number of at least 0")
     x_ref, u_ref, w_ref, v_ref = _signals(system, reference, t[0], prior.mean.size)
@@ -265,7 +266,8 @@ def extended_kalman_bucy(
     ----------
     lecture16, Eqs. (31)-(37).
     """
-    t, prior, y, y0 = _door(system, prior, y, t, rtol, atol)
+    t, prior, y, y0 = _door(system, prior, y, t)
+    rtol, atol = _tolerances(rtol, atol)
     u = _signal("u", u, t[0], None)
     no_w, no_v = np.zeros(len(system.Q)), np.zeros(len(system.R))
     _probe(system, prior.mean, u(t[0]), no_w, no_v, t[0], y0.size)
@@ -387,8 +389,15 @@ def _signal(name: str, value: Any, t0: float, size: int | None) -> Signal:
     return checked
 
 
-def _door(system, prior, y, t, rtol, atol):
-    """What both filters check: t, prior, y and the tolerances; and y at the first time."""
+def _tolerances(rtol: Any, atol: Any) -> tuple[float, float]:
+    relative = validation.number("rtol", rtol, least=1e-13, needed="in [1e-13, 1)")
+    if relative >= 1:
+        raise ValueError(f"rtol must be in [1e-13, 1); found {rtol!r}")
+    return relative, validation.number("atol", atol, above=0, needed="a finite positive number")
+
+
+def _door(system, prior, y, t):
+    """What both filters check: t, prior and y; and y at the first time."""
     if not isinstance(system, ContinuousSystem):
         raise TypeError(f"system must be a ContinuousSystem; found {type(system).__name__}")
     t = _times(t)
@@ -396,10 +405,6 @@ def _door(system, prior, y, t, rtol, atol):
     if prior.mean.ndim != 1 or prior.cov.ndim != 2:
         found = f"{prior.mean.shape} and {prior.cov.shape}"
         raise ValueError(f"prior must have shapes (n,) and (n, n), no batch axes; found {found}")
-    relative = validation.number("rtol", rtol, least=1e-13, needed="in [1e-13, 1)")
-    if relative >= 1:
-        raise ValueError(f"rtol must be in [1e-13, 1); found {rtol!r}")
-    validation.number("atol", atol, above=0, needed="a finite positive number")
     y = _signal("y", y, t[0], None)
     return t, prior, y, y(t[0])
 

@@ -57,9 +57,10 @@ def kalman_update(prior: Gaussian, z: Array, moments: Moments) -> Gaussian:
     perea2007, Eqs. (5)-(7).
     """
     z = validation.given("z", z)
-    n, m = prior.mean.shape[-1], z.shape[-1]
+    n, m = prior.mean.shape[-1], moments.P_zz.shape[-1]
     validation.core("prior.cov", prior.cov, (n, n))
     validation.core("the expected measurement, from model.h,", moments.z_hat, (m,))
+    validation.core("z", z, (m,))
     validation.core("its covariance, from model.R,", moments.P_zz, (m, m))
     validation.core("P_xz, from model.jacobian or model.h,", moments.P_xz, (n, m))
     K = right_divide(moments.P_xz, moments.P_zz)

@@ -57,18 +57,30 @@ def predict(estimate: Gaussian, dynamics: Dynamics) -> Gaussian:
     ----------
     xiong2009, Eqs. (3) and (4).
     """
+    x, F = _moved(estimate, dynamics)
+    return Gaussian(x, _spread(estimate, F, dynamics, _noise(estimate, dynamics)))
+
+
+def _moved(estimate: Gaussian, dynamics: Dynamics) -> tuple[Array, Array]:
+    """The transition, of arrays with the axes that it must have."""
     x, F = dynamics.transition(estimate.mean)
-    validation.core("f(x) of dynamics.transition", x, estimate.mean.shape[-1:])
-    return Gaussian(x, _spread(estimate, F, dynamics, dynamics.Q))
+    n = estimate.mean.shape[-1]
+    validation.core("f(x) of dynamics.transition", x, (n,))
+    return x, validation.core("F of dynamics.transition", F, (n, n))
+
+
+def _noise(estimate: Gaussian, dynamics: Dynamics) -> Array:
+    """Q, if it is a matrix: a vector or a number would be added to every row."""
+    Q = validation.given("dynamics.Q", dynamics.Q)
+    return validation.core("dynamics.Q", Q, estimate.mean.shape[-1:] * 2)
 
 
 def _spread(estimate: Gaussian, F: Array, dynamics: Dynamics, Q: Array) -> Array:
     """Eq. (4), its rounding made symmetric."""
     accumulate = getattr(dynamics, "accumulate", None)
-    square = estimate.mean.shape[-1:] * 2
-    validation.core("F of dynamics.transition", F, square)
-    Q = Q if accumulate is None else accumulate(Q, estimate.mean)
-    Q = validation.core("dynamics.Q", validation.given("dynamics.Q", Q), square)
+    if accumulate is not None:
+        Q = accumulate(Q, estimate.mean)
+        validation.core("dynamics.accumulate", Q, estimate.mean.shape[-1:] * 2)
     P = F @ estimate.cov @ F.mT + Q
     return (P + P.mT) / 2
 
@@ -330,7 +342,7 @@ class AdaptiveEKF:
         self, state: AdaptiveState, z: Array, dynamics: Dynamics, sensor: MeasurementModel
     ) -> AdaptiveState:
         """One prediction with the tuned Q and one update; as :meth:`ExtendedKalman.step`."""
-        x, F = dynamics.transition(state.estimate.mean)
+        x, F = _moved(state.estimate, dynamics)
         xp = x.__array_namespace__()
         z = validation.given("z", z)
         y = (z - validation.core("sensor.h", sensor.h(x), z.shape[-1:]))[..., None, :]
@@ -339,7 +351,8 @@ class AdaptiveEKF:
         count = xp.broadcast_to(state.count + 1, y.shape[:-2])
         used, exist = (window, count) if self.current else (past, count - 1)
         E = self._factor(used, (exist >= self.N + self.k)[..., None, None])
-        prior = Gaussian(x, _spread(state.estimate, F, dynamics, E @ dynamics.Q @ E.mT))
+        Q = E @ _noise(state.estimate, dynamics) @ E.mT
+        prior = Gaussian(x, _spread(state.estimate, F, dynamics, Q))
         return AdaptiveState(_update(prior, z, sensor), window, count)
 
     def _factor(self, window: Array, full: Array) -> Array:

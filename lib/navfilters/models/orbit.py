@@ -34,9 +34,9 @@ class Thrust:
     arcs: tuple[tuple[float, float], ...]
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.magnitude) and self.magnitude >= 0):
-            raise ValueError(f"magnitude must be at least 0; found {self.magnitude}")
-        times = np.array(self.arcs, float).reshape(-1)
+        magnitude = validation.number("magnitude", self.magnitude, least=0, needed="at least 0")
+        object.__setattr__(self, "magnitude", magnitude)
+        times = validation.real_array("arcs", self.arcs, "").reshape(-1)
         if 2 * len(self.arcs) != times.size or not (np.diff(times) >= 0).all():
             raise ValueError(f"arcs must be (start, end) pairs in order of time; found {self.arcs}")
 
