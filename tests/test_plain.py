@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from navfilters import FILTERS, Gaussian, SigmaPoints, run, sweep, validation
+from navfilters import (
+    FILTERS,
+    Gaussian,
+    SigmaPoints,
+    first_indefinite,
+    run,
+    sweep,
+    validation,
+)
 from navfilters.consistency import mean_nees, nees
 from navfilters.continuous import ContinuousSystem, extended_kalman_bucy
 from navfilters.discrete import DiscreteSystem, extended_kalman_filter, predict, update
@@ -118,6 +126,7 @@ def together(z):
     return kalman_update(prior, z, linearized(prior, MODEL))
 
 
+ALONE = Gaussian(MEAN, COV)
 BUMPED = FILTERS["B-EKF 1"]
 DOORS = {
     "run, mean": ("prior.mean", MEAN, lambda a: ran(mean=a)),
@@ -183,6 +192,8 @@ DOORS = {
         [0.0, 0.1],
         lambda a: extended_kalman_bucy(CONTINUOUS, Gaussian(MEAN, COV), lambda t: Z, a),
     ),
+    "first_indefinite": ("cov", [COV, COV], first_indefinite),
+    "linear_limit, z": ("z", Z, lambda a: FILTERS["EKF"].linear_limit(ALONE, a, Linear(COV, R))),
     "nees, error": ("error", MEAN, lambda a: nees(a, COV)),
     "mean_nees, cov": ("cov", [COV, COV], lambda a: mean_nees([MEAN, Z], a)),
 }

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from test_probing import ALONE, PRIORS, RIGHT, WRONG, Model, Z
 
-from navfilters import FILTERS, Gaussian, sweep
+from navfilters import FILTERS, Gaussian, SigmaPoints, sweep
 from navfilters.attitude import normalized
 from navfilters.continuous import ContinuousSystem, Reference, linearized_kalman_bucy
 from navfilters.continuous import extended_kalman_bucy as continuous
@@ -16,6 +16,8 @@ from navfilters.discrete import extended_kalman_filter as discrete
 from navfilters.multiplicative import MekfState, mekf_update
 from navfilters.robust import AdaptiveEKF, AdaptiveRobustEKF, ExtendedKalman, RobustEKF
 
+PRIORS3 = Gaussian(PRIORS.mean, np.stack([PRIORS.cov] * 3))
+TWO = SigmaPoints(alpha=[0.5, 1.0])
 DIRECT = {
     "h: one of two": ("EKF", "from model.h, must have shape"),
     "h: no axis for the component": ("EKF", "from model.h, must have shape"),
@@ -43,6 +45,22 @@ def test_a_filter_called_directly_names_the_shape(wrong):
 def test_a_z_of_another_size_is_refused_directly(name, z):
     with pytest.raises(ValueError, match="must have shape"):
         FILTERS[name](PRIORS, z, RIGHT)
+
+
+@pytest.mark.parametrize(
+    ("go", "message"),
+    [
+        (
+            lambda: FILTERS["EKF"](PRIORS, np.ones((2, 2)), RIGHT),
+            r"z \(2,\), prior_and_model \(3,\)",
+        ),
+        (lambda: FILTERS["B-UKF"](PRIORS, Z, RIGHT, bump=[1.0, 2.0]), r"bump \(2,\), .*\(3,\)"),
+        (lambda: FILTERS["UKF"](PRIORS3, Z, RIGHT, points=TWO), r"points \(2,\), prior \(3,\)"),
+    ],
+)
+def test_batch_axes_that_do_not_broadcast_are_named_directly(go, message):
+    with pytest.raises(ValueError, match=rf"axes must broadcast; found {message}"):
+        go()
 
 
 @dataclass(frozen=True)

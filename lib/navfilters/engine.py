@@ -106,7 +106,7 @@ def first_indefinite(cov: Array) -> np.ndarray:
     ValueError
         Fewer than three axes, or matrices that are not square.
     """
-    cov = np.asarray(cov)
+    cov = np.asarray(validation.plain("cov", cov))
     if cov.ndim < 3 or cov.shape[-1] != cov.shape[-2]:
         raise ValueError(f"cov must have shape (steps + 1, ..., n, n); found {cov.shape}")
     with np.errstate(all="ignore"):

@@ -64,7 +64,12 @@ def kalman_update(prior: Gaussian, z: Array, moments: Moments) -> Gaussian:
     validation.core("its covariance, from model.R,", moments.P_zz, (m, m))
     validation.core("P_xz, from model.jacobian or model.h,", moments.P_xz, (n, m))
     K = right_divide(moments.P_xz, moments.P_zz)
-    mean = prior.mean + matmul(K, (z - moments.z_hat)[..., None])[..., 0]
+    try:
+        residual = z - moments.z_hat
+    except (TypeError, ValueError):  # of JAX, of NumPy: this names what does not fit
+        validation.batch(z=z.shape[:-1], prior_and_model=moments.z_hat.shape[:-1])
+        raise
+    mean = prior.mean + matmul(K, residual[..., None])[..., 0]
     reduction = matmul(K, moments.P_xz.mT)
     return Gaussian(mean, prior.cov - (reduction + reduction.mT) / 2)
 
@@ -263,6 +268,8 @@ def _per_member(like: Array, value: Array) -> Array:
         value = validation.real_array("bump", value, "", finite=False)
         if not (value >= 0).all():
             raise ValueError(f"bump must be at least 0; found {np.min(value)}")
+        if value.ndim:
+            validation.batch(bump=value.shape, prior_and_model=like.shape[:-2])
     return like.__array_namespace__().asarray(value)[..., None, None]
 
 
@@ -369,8 +376,12 @@ class Filter:
             Computed in the information form, (P^-1 + H^T R^-1 H)^-1, by LAPACK: no line of the
             filters takes part.
         """
+        z, R = validation.given("z", z), noise(model)
+        prior = Gaussian(
+            validation.given("prior.mean", prior.mean), validation.given("prior.cov", prior.cov)
+        )
         H = model.jacobian(prior.mean)
-        P, R = self.limit(prior.cov, H, model.R, **_accepted(self.limit, options))
+        P, R = self.limit(prior.cov, H, R, **_accepted(self.limit, options))
         weight = H.mT @ np.linalg.inv(R)
         cov = np.linalg.inv(np.linalg.inv(P) + weight @ H)
         residual = z - (H @ prior.mean[..., None])[..., 0]

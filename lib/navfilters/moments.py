@@ -213,6 +213,8 @@ def sigma_points(prior: Gaussian, points: SigmaPoints) -> Array:
     xp = prior.cov.__array_namespace__()
     n = prior.mean.shape[-1]
     gamma, *_ = points.weights(n, xp)
+    if gamma.ndim:
+        validation.batch(points=gamma.shape, prior=prior.cov.shape[:-2])
     S = gamma[..., None, None] * ROOTS[points.root](prior.cov)
     batch = xp.broadcast_shapes(S.shape[:-2], prior.mean.shape[:-1])
     columns = xp.moveaxis(xp.broadcast_to(S, (*batch, n, n)), -1, 0)

@@ -57,23 +57,28 @@ def probe(
     TypeError
         As of :func:`~navfilters.derivatives.complex_step`.
     """
-    shapes = ", ".join(str(np.shape(a)) for a in arguments)
-    needed = f"{name} must return shape (..., {', '.join(map(str, core))}) from shapes {shapes}"
+
+    def wrong(found: Any, shape: tuple = ("...", *core)) -> ValueError:
+        needed = ", ".join(map(str, shape)) + "," * (len(shape) == 1)
+        shapes = ", ".join(str(np.shape(a)) for a in arguments)
+        return ValueError(
+            f"{name} must return shape ({needed}) from shapes {shapes}; found {found}"
+        )
+
     try:
         value = function(*map(_unwritable, arguments))
     except (ValueError, IndexError, AttributeError) as error:
         if "read-only" in str(error):
             raise ValueError(f"{name} must not change its arguments; found {error}") from error
-        raise ValueError(f"{needed}; found {type(error).__name__}: {error}") from error
+        raise wrong(f"{type(error).__name__}: {error}") from error
     array = validation.real_array(f"the value of {name}", value, "", finite=finite)
     found, size = array.shape, array.ndim - len(core)
     if found[max(0, size) :] != core or size < 0:
-        raise ValueError(f"{needed}; found {found}")
+        raise wrong(found)
     if batch is not None and not (
         _broadcasts(found[:size], batch) and _broadcasts(least, found[:size])
     ):
-        whole = f"{name} must return shape {(*batch, *core)} from shapes {shapes}"
-        raise ValueError(f"{whole}; found {found}")
+        raise wrong(found, (*batch, *core))
     if getattr(value, "dtype", np.float64) in (np.float32, np.float16):
         raise ValueError(
             f"{name} must return doubles; found {value.dtype} (JAX computes in doubles after "

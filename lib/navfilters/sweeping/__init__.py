@@ -118,7 +118,8 @@ def sweep(
     ------
     ValueError
         A wrong shape, a value that is not finite, a covariance that is not one, an unknown name,
-        masked entries, a model's function that mixes configurations: before any step. A checkpoint file that is damaged or belongs to another sweep.
+        masked entries, a model's function that mixes configurations: before any step. A checkpoint
+        file that is damaged or belongs to another sweep.
     TypeError
         An estimator that is none.
     SweepError
