@@ -175,9 +175,10 @@ def probe_models(job: Job, problem: Problem) -> None:
             if not march.remembers:
                 probing.sensor(march.model, mean, name="priors")
                 continue
+            if not _of_this_library(march):
+                return
             dynamics, sensor = march.model
-            if hasattr(dynamics, "transition"):
-                probing.dynamics(dynamics, mean, name="model[0]")
+            probing.dynamics(dynamics, mean, name="model[0]")
             probing.sensor(sensor, mean, name="priors")
         except ValueError as error:
             if not any(leaf.core and leaf.name.startswith("model") for leaf in problem.leaves):
@@ -187,6 +188,20 @@ def probe_models(job: Job, problem: Problem) -> None:
                 "fields of a dataclass, not in a closure, and those that are no matrices say so: "
                 'field(metadata={"axes": number}).)'
             ) from error
+
+
+def _of_this_library(march: March) -> bool:
+    """Whether a filter with a memory asks of its models what ``navfilters.robust`` does.
+
+    One whose state is no Gaussian, or whose dynamics have no transition, has an interface of its
+    own with them.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            state = march.estimator.init(march.prior)
+    except Exception:  # the first step will tell, and name the configuration
+        return False
+    return hasattr(march.model[0], "transition") and "estimate" in getattr(state, "_fields", ())
 
 
 def _with_members(leaf: Leaf, batch: tuple[int, ...]) -> Leaf:
