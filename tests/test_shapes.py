@@ -63,6 +63,16 @@ def test_batch_axes_that_do_not_broadcast_are_named_directly(go, message):
         go()
 
 
+@pytest.mark.parametrize("kind", [complex, object, bool, str])
+@pytest.mark.parametrize("door", ["prior.mean", "prior.cov", "z", "model.R"])
+def test_what_is_no_real_number_is_refused_directly(door, kind):
+    given = {"prior.mean": PRIORS.mean, "prior.cov": PRIORS.cov, "z": Z, "model.R": RIGHT.R}
+    given[door] = given[door].astype(kind)
+    mean, cov, z, R = given.values()
+    with pytest.raises(ValueError, match=rf"{door} must be .*real numbers; found dtype"):
+        FILTERS["UKF"](Gaussian(mean, cov), z, Model(R=R))
+
+
 @dataclass(frozen=True)
 class Moving:
     Q: object = None

@@ -58,11 +58,17 @@ def kalman_update(prior: Gaussian, z: Array, moments: Moments) -> Gaussian:
     """
     z = validation.given("z", z)
     n, m = prior.mean.shape[-1], moments.P_zz.shape[-1]
-    validation.core("prior.cov", prior.cov, (n, n))
-    validation.core("the expected measurement, from model.h,", moments.z_hat, (m,))
-    validation.core("z", z, (m,))
-    validation.core("its covariance, from model.R,", moments.P_zz, (m, m))
-    validation.core("P_xz, from model.jacobian or model.h,", moments.P_xz, (n, m))
+    if not (
+        prior.cov.shape[-2:] == (n, n)
+        and moments.z_hat.shape[-1:] == z.shape[-1:] == (m,)
+        and moments.P_zz.shape[-2:] == (m, m)
+        and moments.P_xz.shape[-2:] == (n, m)
+    ):  # this names what does not fit
+        validation.core("prior.cov", prior.cov, (n, n))
+        validation.core("the expected measurement, from model.h,", moments.z_hat, (m,))
+        validation.core("z", z, (m,))
+        validation.core("its covariance, from model.R,", moments.P_zz, (m, m))
+        validation.core("P_xz, from model.jacobian or model.h,", moments.P_xz, (n, m))
     K = right_divide(moments.P_xz, moments.P_zz)
     try:
         residual = z - moments.z_hat
@@ -259,12 +265,17 @@ def expect_at_mean(prior: Gaussian, model: MeasurementModel, moments: Moments):
     return prior, moments._replace(z_hat=model.h(prior.mean))
 
 
+def _given(prior: Gaussian) -> Gaussian:
+    mean, cov = prior.mean, prior.cov
+    return Gaussian(validation.given("prior.mean", mean), validation.given("prior.cov", cov))
+
+
 def _add_noise(moments: Moments, extra: Array) -> Moments:
     return moments._replace(P_zz=moments.P_zz + extra)
 
 
 def _per_member(like: Array, value: Array) -> Array:
-    if not validation.traced(value):
+    if not (type(value) is float and value >= 0) and not validation.traced(value):
         value = validation.real_array("bump", value, "", finite=False)
         if not (value >= 0).all():
             raise ValueError(f"bump must be at least 0; found {np.min(value)}")
@@ -346,9 +357,10 @@ class Filter:
         if unknown:
             has = ", ".join(self.options) or "none"
             raise TypeError(f"unknown options {sorted(unknown)}; this filter has {has}")
-        prior = Gaussian(
-            validation.given("prior.mean", prior.mean), validation.given("prior.cov", prior.cov)
-        )
+        mean, cov = prior.mean, prior.cov
+        plain = type(mean) is type(cov) is np.ndarray and mean.dtype.char == cov.dtype.char == "d"
+        if not plain:
+            prior = _given(prior)
         moments = self.moments(prior, model, **_accepted(self.moments, options))
         changed, moments = self.variant(prior, model, moments, **_accepted(self.variant, options))
         return kalman_update(changed, z, moments)
@@ -377,9 +389,7 @@ class Filter:
             filters takes part.
         """
         z, R = validation.given("z", z), noise(model)
-        prior = Gaussian(
-            validation.given("prior.mean", prior.mean), validation.given("prior.cov", prior.cov)
-        )
+        prior = _given(prior)
         H = model.jacobian(prior.mean)
         P, R = self.limit(prior.cov, H, R, **_accepted(self.limit, options))
         weight = H.mT @ np.linalg.inv(R)

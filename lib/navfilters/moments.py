@@ -59,6 +59,8 @@ def noise(model: MeasurementModel) -> Array:
         Another shape, no real numbers, masked entries or a unit.
     """
     R = validation.given("model.R", model.R)
+    if R.ndim > 1 and R.shape[-1] == R.shape[-2]:
+        return R
     return validation.core("model.R", R, R.shape[-1:] * 2 or (1, 1))
 
 

@@ -45,11 +45,11 @@ def given(name: str, value: Any) -> Any:
     ValueError
         As of :func:`real_array`, but of a plain array only the type of its elements is looked at.
     """
-    if type(value) is np.ndarray:
-        known = True
-    else:
-        known = hasattr(value, "__array_namespace__")
-        known = known and not isinstance(value, np.ndarray | np.generic)
+    if type(value) is np.ndarray and value.dtype.char == "d":
+        return value  # what is nearly always given
+    known = type(value) is np.ndarray or (
+        hasattr(value, "__array_namespace__") and not isinstance(value, np.ndarray | np.generic)
+    )
     if known and value.dtype.kind in "fiu":
         return value
     return real_array(name, value, "", finite=False)
