@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from navfilters import validation
 from navfilters.types import Array
 
 
@@ -161,7 +162,7 @@ def lemma_bound(
     ----------
     xiong2009, Lemma 1, Eqs. (10)-(12).
     """
-    t = np.asarray(t)
+    t = validation.real_array("t", t, "")
     q = 1.0 - lam
     terms = np.where(t > 0, t, 0.0) if lam == 0 else (1 - q**t) / lam
     if as_printed:

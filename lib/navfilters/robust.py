@@ -6,7 +6,8 @@ A filter is a frozen set of tuning parameters with ``init(prior) -> state`` and
 ``step(state, z, dynamics, sensor) -> state``; the state is a named tuple of the estimate, the
 filter's memory and its counters. Everything is batched over members, and every tuning parameter
 that is a real number may be an array (...), one value per member. Parameters are checked when a
-filter is made, models and measurements are not: a member that fails is NaN, alone.
+filter is made; of priors, models and measurements only the kind and the trailing axes are: a member
+that fails is NaN, alone.
 """
 
 from collections.abc import Callable
@@ -56,14 +57,31 @@ def predict(estimate: Gaussian, dynamics: Dynamics) -> Gaussian:
     ----------
     xiong2009, Eqs. (3) and (4).
     """
+    x, F = _moved(estimate, dynamics)
+    return Gaussian(x, _spread(estimate, F, dynamics, _noise(estimate, dynamics)))
+
+
+def _moved(estimate: Gaussian, dynamics: Dynamics) -> tuple[Array, Array]:
+    """The transition, of arrays with the axes that it must have."""
     x, F = dynamics.transition(estimate.mean)
-    return Gaussian(x, _spread(estimate, F, dynamics, dynamics.Q))
+    n = estimate.mean.shape[-1]
+    validation.core("f(x) of dynamics.transition", x, (n,))
+    return x, validation.core("F of dynamics.transition", F, (n, n))
+
+
+def _noise(estimate: Gaussian, dynamics: Dynamics) -> Array:
+    """Q, if it is a matrix: a vector or a number would be added to every row."""
+    Q = validation.given("dynamics.Q", dynamics.Q)
+    return validation.core("dynamics.Q", Q, estimate.mean.shape[-1:] * 2)
 
 
 def _spread(estimate: Gaussian, F: Array, dynamics: Dynamics, Q: Array) -> Array:
     """Eq. (4), its rounding made symmetric."""
     accumulate = getattr(dynamics, "accumulate", None)
-    P = F @ estimate.cov @ F.mT + (Q if accumulate is None else accumulate(Q, estimate.mean))
+    if accumulate is not None:
+        Q = accumulate(Q, estimate.mean)
+        validation.core("dynamics.accumulate", Q, estimate.mean.shape[-1:] * 2)
+    P = F @ estimate.cov @ F.mT + Q
     return (P + P.mT) / 2
 
 
@@ -105,7 +123,7 @@ class ExtendedKalman:
         -------
         KalmanState
         """
-        return KalmanState(prior)
+        return KalmanState(_given(prior))
 
     def step(
         self, state: KalmanState, z: Array, dynamics: Dynamics, sensor: MeasurementModel
@@ -180,7 +198,7 @@ class RobustEKF:
     on_violation: Literal["skip", "nan", "raise"] = "skip"
 
     def __post_init__(self) -> None:
-        if not np.all(np.asarray(self.gamma) > 0):
+        if not (validation.real_array("gamma", self.gamma, "", finite=False) > 0).all():
             raise ValueError(f"gamma must be positive; found {self.gamma}")
         if self.on_violation not in ("skip", "nan", "raise"):
             raise ValueError(
@@ -189,6 +207,7 @@ class RobustEKF:
 
     def init(self, prior: Gaussian) -> RobustState:
         """The state before any measurement; as :meth:`ExtendedKalman.init`."""
+        prior = _given(prior)
         return RobustState(prior, _zeros(prior))
 
     def step(
@@ -302,14 +321,18 @@ class AdaptiveEKF:
 
     def __post_init__(self) -> None:
         validation.real_array("a", self.a, "")
-        validation.real_array("directions", self.directions, "n, m")
-        for name, least in (("k", 1), ("N", 2)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-                raise ValueError(f"{name} must be an integer of at least {least}; found {value!r}")
+        checked = {
+            "k": validation.whole_number("k", self.k, 1),
+            "N": validation.whole_number("N", self.N, 2),
+            "directions": validation.real_array("directions", self.directions, "n, m"),
+            "current": validation.flag("current", self.current),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
 
     def init(self, prior: Gaussian) -> AdaptiveState:
         """The state before any measurement; as :meth:`ExtendedKalman.init`."""
+        prior = _given(prior)
         xp = prior.mean.__array_namespace__()
         count = _zeros(prior)
         window = (*count.shape, self.N + self.k, np.shape(self.directions)[-1])
@@ -319,15 +342,17 @@ class AdaptiveEKF:
         self, state: AdaptiveState, z: Array, dynamics: Dynamics, sensor: MeasurementModel
     ) -> AdaptiveState:
         """One prediction with the tuned Q and one update; as :meth:`ExtendedKalman.step`."""
-        x, F = dynamics.transition(state.estimate.mean)
+        x, F = _moved(state.estimate, dynamics)
         xp = x.__array_namespace__()
-        y = (z - sensor.h(x))[..., None, :]
+        z = validation.given("z", z)
+        y = (z - validation.core("sensor.h", sensor.h(x), z.shape[-1:]))[..., None, :]
         past = xp.broadcast_to(state.innovations, (*y.shape[:-2], *state.innovations.shape[-2:]))
         window = xp.concat([past[..., 1:, :], y], axis=-2)
         count = xp.broadcast_to(state.count + 1, y.shape[:-2])
         used, exist = (window, count) if self.current else (past, count - 1)
         E = self._factor(used, (exist >= self.N + self.k)[..., None, None])
-        prior = Gaussian(x, _spread(state.estimate, F, dynamics, E @ dynamics.Q @ E.mT))
+        Q = E @ _noise(state.estimate, dynamics) @ E.mT
+        prior = Gaussian(x, _spread(state.estimate, F, dynamics, Q))
         return AdaptiveState(_update(prior, z, sensor), window, count)
 
     def _factor(self, window: Array, full: Array) -> Array:
@@ -431,6 +456,7 @@ class AdaptiveRobustEKF:
 
     def init(self, prior: Gaussian) -> AdaptiveRobustState:
         """The state before any measurement; as :meth:`ExtendedKalman.init`."""
+        prior = _given(prior)
         return AdaptiveRobustState(prior, None, _zeros(prior), _zeros(prior))
 
     def step(
@@ -440,7 +466,8 @@ class AdaptiveRobustEKF:
         prior = predict(state.estimate, dynamics)
         z_hat, P_y, _ = linearized(prior, sensor)
         xp = P_y.__array_namespace__()
-        y = z - z_hat
+        z = validation.given("z", z)
+        y = z - validation.core("sensor.h", z_hat, z.shape[-1:])
         P_y_bar = y[..., :, None] * y[..., None, :]
         if state.P_y_bar is not None:
             rho = xp.asarray(self.rho)[..., None, None]
@@ -454,6 +481,14 @@ class AdaptiveRobustEKF:
         robust = _count(state.robust, robust, estimate)
         clipped = _count(state.clipped, clipped, estimate)
         return AdaptiveRobustState(estimate, P_y_bar, robust, clipped)
+
+
+def _given(prior: Gaussian) -> Gaussian:
+    """A prior whose arrays are of a kind that products keep, and fit together."""
+    mean, cov = (validation.given(f"prior.{name}", a) for name, a in prior._asdict().items())
+    if mean.ndim == 0:
+        raise ValueError(f"prior.mean must have shape (..., n); found {mean.shape}")
+    return Gaussian(mean, validation.core("prior.cov", cov, mean.shape[-1:] * 2))
 
 
 def _zeros(prior: Gaussian) -> Array:

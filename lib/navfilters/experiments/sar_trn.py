@@ -37,11 +37,6 @@ from navfilters.multiplicative import MekfState, MekfUpdate, mekf_update
 from navfilters.types import Array
 
 
-def _whole(name: str, value: Any, least: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ValueError(f"{name} must be an integer of at least {least}; found {value!r}")
-
-
 @dataclass(frozen=True)
 class Setup:
     """The open-loop experiment; change a field with ``dataclasses.replace`` and run again.
@@ -135,8 +130,8 @@ class Setup:
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise ValueError(f"{name} must be positive; found {getattr(self, name)}")
         for name in ("steps", "shortest"):
-            _whole(name, getattr(self, name), 1)
-        _whole("underweighted", self.underweighted, 0)
+            validation.whole_number(name, getattr(self, name), 1)
+        validation.whole_number("underweighted", self.underweighted, 0)
         for name in NOT_NEGATIVE:
             found, needed = getattr(self, name), (3,) if name == "pixel" else ()
             value = validation.real_array(name, found, "")
@@ -302,7 +297,7 @@ def truth(setup: Setup = CASES["TC-1"], intervals: int = 72) -> Truth:
     ----------
     pogorelsky2020, sections "Closed-loop trajectory" and "Open-loop trajectory".
     """
-    _whole("intervals", intervals, 1)
+    validation.whole_number("intervals", intervals, 1)
     orbit = replace(setup, integrator="rk4").orbit
     flown = max(intervals, setup.shortest)
     x = orbit.path(initial_state(setup), flown * setup.steps)[:: setup.steps]
@@ -528,7 +523,7 @@ def monte_carlo(
     pogorelsky2020, Figs. 8 to 11.
     """
     setup = of_case(case)
-    _whole("updates", updates, 1)
+    validation.whole_number("updates", updates, 1)
     if flight is None:
         flight = truth(setup, max(updates, setup.shortest))
     intervals = len(flight.times) - 1
