@@ -169,9 +169,9 @@ def _faults_of_source(claim: Claim):
         yield "a threshold of ours needs the word that it reads, or own_rule"
     if claim.threshold == PRINTED and claim.word:
         yield "a printed threshold reads no word"
-    if claim.kind == "value" and claim.threshold == PRINTED and not claim.own_rule:
-        if claim.shape_rule not in (None, SHAPE_OF_A_NUMBER):
-            yield f"a printed number's shape_rule is {SHAPE_OF_A_NUMBER}; found {claim.shape_rule}"
+    number = claim.kind == "value" and claim.threshold == PRINTED and not claim.own_rule
+    if number and claim.shape_rule not in (None, SHAPE_OF_A_NUMBER):
+        yield f"a printed number's shape_rule is {SHAPE_OF_A_NUMBER}; found {claim.shape_rule}"
     if claim.quantifier not in ("", "some"):
         yield f"quantifier can only be 'some'; found {claim.quantifier!r}"
     if any(set(old) != {"was", "why"} for old in claim.revised):
