@@ -47,9 +47,9 @@ class Images:
     seed : int
     imaging : Imaging
     geometry : {"nominal", "predicted"}
-        What turns a run's in-track velocity into the effective one: the true position and pixel,
-        as in the paper, where the velocity alone is perturbed; or the run's own position and
-        boresight, whose errors then enter the measured velocity.
+        What turns a run's in-track velocity into the effective one: the true position and pixel, so
+        that the velocity alone is the run's; or the run's own position and boresight, whose errors
+        then enter the measured velocity. The text leaves open which.
     tables : callable
         (setup, k, imaging) -> ImageTable: computed by default, or from a file.
 
