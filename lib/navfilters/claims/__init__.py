@@ -1,0 +1,53 @@
+"""The ledger: every claim of every source, and whether it held.
+
+``book/claims.toml`` holds one entry per claim. A chapter computes a value and calls
+``claims.check("claim-id", value)`` under its figure. The verdict is *derived* from the fresh value,
+and a recorded verdict that the fresh value does not give is an error: the notebook stops, and with
+it the build. The badge that appears shows the ledger's numbers, which the fresh ones were just
+found to equal.
+"""
+
+from .checking import check
+from .ledger import (
+    ESTABLISHED,
+    IN_SHAPE,
+    KINDS,
+    NOT_REPRODUCED,
+    REPRODUCED,
+    UNDERDETERMINED,
+    VERDICTS,
+    Claim,
+    ClaimError,
+    Word,
+    find,
+    load,
+    load_words,
+)
+from .pages import Badge, Page, rules, scorecard, summary
+from .verdicts import Parts, Readings, Some, derive
+
+__all__ = [
+    "ESTABLISHED",
+    "IN_SHAPE",
+    "KINDS",
+    "NOT_REPRODUCED",
+    "REPRODUCED",
+    "UNDERDETERMINED",
+    "VERDICTS",
+    "Badge",
+    "Claim",
+    "ClaimError",
+    "Page",
+    "Parts",
+    "Readings",
+    "Some",
+    "Word",
+    "check",
+    "derive",
+    "find",
+    "load",
+    "load_words",
+    "rules",
+    "scorecard",
+    "summary",
+]

@@ -1,0 +1,238 @@
+"""What a reader sees of the ledger: badges, the summary, the scorecard, the rules."""
+
+import html
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .ledger import OURS, PRINTED, VERDICTS, Claim, ClaimError, find, load, load_words
+
+
+@dataclass(frozen=True)
+class Badge:
+    """What a reader sees of a check: the claim, the paper's value, ours and the verdict.
+
+    Parameters
+    ----------
+    claim : Claim
+    """
+
+    claim: Claim
+
+    def __repr__(self) -> str:
+        c = self.claim
+        return f"[{c.verdict}] {c.id}: {_side(c)} {plain(c.paper_value)}, ours {plain(c.ours)}"
+
+    def _repr_html_(self) -> str:
+        c = self.claim
+        numbers = f"ours {_rich(c.ours)}"
+        if c.paper_value is not None:
+            numbers = f"{_side(c)} {_rich(c.paper_value)} · {numbers}"
+        return (
+            f'<div class="claim claim-{_slug(c.verdict)}" id="claim-{c.id}">'
+            f'<span class="claim-verdict">{c.verdict}</span> {_text(c.statement)} '
+            f'<span class="claim-source">{_text(c.source)}</span>'
+            f'<div class="claim-numbers">{numbers}</div>{_because(c)}</div>'
+        )
+
+
+@dataclass(frozen=True)
+class Page:
+    """A piece of HTML that a notebook shows, with plain text for where there is none.
+
+    Parameters
+    ----------
+    html : str
+    text : str
+    """
+
+    html: str
+    text: str
+
+    def __repr__(self) -> str:
+        return self.text
+
+    def _repr_html_(self) -> str:
+        return self.html
+
+
+def summary() -> Page:
+    """Verdicts of each source, counted, printed limits and our readings of words apart.
+
+    Returns
+    -------
+    Page
+    """
+    ledger = load().values()
+    sources = list(dict.fromkeys(_work(c) for c in ledger))
+    counts = Counter((_work(c), c.threshold, c.verdict) for c in ledger)
+    columns = [(s, t) for s in sources for t in _thresholds(ledger, s)]
+    spans = Counter(source for source, _ in columns)
+    head = "".join(f'<th colspan="{spans[s]}">{_text(s)}</th>' for s in sources)
+    below = "".join(f"<th>{t or ''}</th>" for _, t in columns)
+    rows, lines = [], []
+    for verdict in (*VERDICTS, "all"):
+        chosen = VERDICTS if verdict == "all" else (verdict,)
+        found = [sum(counts[*column, v] for v in chosen) for column in columns]
+        cells = "".join(f"<td>{n or '·'}</td>" for n in found)
+        rows.append(f'<tr class="claim-{_slug(verdict)}"><th>{verdict}</th>{cells}</tr>')
+        named = (f"{s} {t}" if t else s for s, t in columns)
+        lines.append(f"{verdict}: {dict(zip(named, found, strict=True))}")
+    table = (
+        f'<table class="claims-summary"><tr><th>verdict</th>{head}</tr>'
+        f"<tr><th>limit</th>{below}</tr>{''.join(rows)}</table>"
+    )
+    return Page(_scrolling(table), "\n".join(lines))
+
+
+def scorecard(work: str) -> Page:
+    """Every claim of one source: the paper's value, ours, the verdict, and where it is checked.
+
+    Parameters
+    ----------
+    work : str
+        The first word of the claims' source, such as "perea2007".
+
+    Returns
+    -------
+    Page
+        Links are relative to book/.
+
+    Raises
+    ------
+    ClaimError
+        When the ledger holds nothing of that source.
+    """
+    chosen = [c for c in load().values() if _work(c) == work]
+    if not chosen:
+        raise ClaimError(f"no claim of {work!r} in {find()}")
+    rows = []
+    for c in chosen:
+        where = f'<a href="{c.chapter}.html#claim-{c.id}">{_text(_place(c))}</a>'
+        paper = "" if c.paper_value is None else _rich(c.paper_value)
+        if c.threshold == OURS:
+            paper = f'<span class="claim-reason">read as</span> {paper}'
+        rows.append(
+            f"<tr><td>{_text(c.statement)} {where}{_because(c)}</td><td>{paper}</td>"
+            f'<td>{_rich(c.ours)}</td><td class="claim-{_slug(c.verdict)}">'
+            f'<span class="claim-verdict">{c.verdict}</span></td></tr>'
+        )
+    table = _table("claims-table", ("claim", "paper", "ours", "verdict"), rows)
+    return Page(table, "\n".join(repr(Badge(c)) for c in chosen))
+
+
+def rules() -> Page:
+    """How the book reads words of degree, how often, and which claims depart from that and why.
+
+    Returns
+    -------
+    Page
+    """
+    ledger, rows, lines = load().values(), [], []
+    for name, word in load_words().items():
+        using = [c for c in ledger if c.word == name]
+        same = sum(not c.own_rule for c in using)
+        departures = "".join(
+            f'<div class="claim-reason">{_text(_at(c))}: {_text(c.own_rule)}</div>'
+            for c in using
+            if c.own_rule
+        )
+        rows.append(
+            f"<tr><td>{_text(name)}: {_text(word.meaning)}{departures}</td>"
+            f"<td>{_rule(word.rule)}</td><td>{same}</td><td>{len(using) - same}</td></tr>"
+        )
+        lines.append(f"{name}: {_plain_rule(word.rule)}, {same} and {len(using) - same} others")
+    table = _table("claims-table claims-rules", ("word", "rule", "claims", "others"), rows)
+    return Page(table, "\n".join(lines))
+
+
+def _at(claim: Claim) -> str:
+    """A claim's limit, with its name."""
+    return f"{claim.id} ({plain(claim.paper_value)})"
+
+
+def _thresholds(ledger, source: str) -> Sequence[str | None]:
+    found = {c.threshold for c in ledger if _work(c) == source}
+    return [t for t in (PRINTED, OURS, None) if t in found]
+
+
+def _side(claim: Claim) -> str:
+    return "read as" if claim.threshold == OURS else "paper"
+
+
+def _because(claim: Claim) -> str:
+    """What stands under a claim: reason, what is open, the route, rules that it had before."""
+    notes = [claim.reason]
+    if claim.left_open:
+        notes.append(f"Left open: {claim.left_open}")
+    if claim.route:
+        notes.append(f"Twice: {claim.route}")
+    notes += [f"The rule was {old['was']}; changed: {old['why']}" for old in claim.revised]
+    return "".join(f'<div class="claim-reason">{_text(note)}</div>' for note in notes if note)
+
+
+def _scrolling(table: str) -> str:
+    return f'<div class="claims-scroll">{table}</div>'
+
+
+def _table(style: str, head: Sequence[str], rows: Sequence[str]) -> str:
+    top = "".join(f"<th>{title}</th>" for title in head)
+    return _scrolling(f'<table class="{style}"><tr>{top}</tr>{"".join(rows)}</table>')
+
+
+def _work(claim: Claim) -> str:
+    return claim.source.split(",")[0]
+
+
+def _place(claim: Claim) -> str:
+    return claim.source.partition(", ")[2] or claim.chapter.rpartition("/")[2]
+
+
+def _slug(verdict: str) -> str:
+    return verdict.replace(" ", "-")
+
+
+def _text(text: str) -> str:
+    return html.escape(text, quote=False)
+
+
+def _plain_rule(rule: Mapping) -> str:
+    return "; ".join(f"{key.replace('_', ' ')} {value:g}" for key, value in rule.items())
+
+
+def _rule(rule: Mapping) -> str:
+    if "factor" in rule:
+        return f"within a factor {rule['factor']:g}"
+    return _rich(rule)
+
+
+def plain(value: Any) -> str:
+    """A value in few digits."""
+    if value is None:
+        return "none"
+    if isinstance(value, Mapping):
+        return "; ".join(f"{key}: {plain(item)}" for key, item in value.items())
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return ", ".join(plain(item) for item in value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | float):
+        return f"{value:.5g}"
+    return str(value)
+
+
+def _rich(value: Any) -> str:
+    names = {"at_most": "≤ ", "at_least": "≥ "}
+    if isinstance(value, Mapping):
+        return "; ".join(f"{names.get(k) or _text(k) + ': '}{_rich(v)}" for k, v in value.items())
+    if isinstance(value, int | float) and not isinstance(value, bool) and value:
+        digits = f"{value:.5g}"
+        if "e" in digits:
+            mantissa, exponent = digits.split("e")
+            return f"{mantissa}&thinsp;×&thinsp;10<sup>{int(exponent)}</sup>"
+    if isinstance(value, list | tuple):
+        return ", ".join(_rich(item) for item in value)
+    return _text(plain(value))

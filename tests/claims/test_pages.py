@@ -1,0 +1,106 @@
+"""What a reader sees of the ledger."""
+
+import pytest
+from entries import ENTRY, finding, make
+
+from navfilters import claims
+from navfilters.claims import Badge, ClaimError
+
+# --- what is shown ------------------------------------------------------------------------------
+
+OURS = {"threshold": "ours", "own_rule": "A test."}
+SHOWN = {
+    "value": (
+        make(ours=1.23456789e-7),
+        "paper 10, ours 1.2346e-07",
+        "1.2346&thinsp;×&thinsp;10<sup>-7",
+    ),
+    "bound": (make("bound", ours=[1, 2.5]), "at_most: 1, ours 1, 2.5", "paper ≤ 1 · ours 1, 2.5"),
+    "order": (
+        make("order", ours={"a": 1, "b": 0}),
+        "paper a, b, c",
+        "paper a, b, c · ours a: 1; b: 0",
+    ),
+    "boolean": (make("boolean", ours=False), "paper yes, ours no", "paper yes · ours no"),
+    "reading": (
+        make("bound", ours=2, **OURS),
+        "read as at_most: 1, ours 2",
+        "read as ≤ 1 · ours 2",
+    ),
+    "finding": (finding(ours=3), "paper none, ours 3", 'numbers">ours 3<'),
+}
+
+
+@pytest.mark.parametrize("kind", SHOWN)
+def test_the_badge_shows_both_values_and_the_verdict(kind):
+    claim, plain, rich = SHOWN[kind]
+    assert repr(Badge(claim)).startswith(f"[{claim.verdict}] some-claim: ")
+    assert plain in repr(Badge(claim))
+    html = Badge(claim)._repr_html_()
+    assert rich in html
+    assert f'class="claim claim-{claim.verdict.replace(" ", "-")}" id="claim-some-claim"' in html
+    for text in (claim.verdict, claim.statement, claim.source, claim.reason):
+        assert f">{text}<" in html or f" {text} <" in html
+
+
+def test_the_badge_escapes_what_it_shows():
+    claim = make("order", statement="a < b & c", source="x, <i>", reason="<b>", ours={"<s>": 1})
+    html = Badge(claim)._repr_html_()
+    for text in ("a &lt; b &amp; c", "x, &lt;i&gt;", "&lt;b&gt;", "&lt;s&gt;: 1"):
+        assert text in html
+    assert not any(tag in html for tag in ("<i>", "<b>", "<s>"))
+
+
+def test_summary_and_scorecard_count_and_list(ledger):
+    own = "source = 'this book'\nagreement = { abs = 0 }\nroute = 'Two ways.'"
+    ledger(
+        ENTRY.format(id="ten"),
+        ENTRY.format(id="own")
+        .replace('source = "someone1999, Fig. 1"', own)
+        .replace("paper_value = 10", "")
+        .replace('threshold = "printed"', "")
+        .replace('"reproduced"', '"established here"'),
+        ENTRY.format(id="word").replace('"printed"', '"ours"\nown_rule = "A test."'),
+    )
+    lines = repr(claims.summary()).splitlines()
+    assert (
+        lines[0] == "reproduced: {'someone1999 printed': 1, 'someone1999 ours': 1, 'this book': 0}"
+    )
+    assert lines[4:] == [
+        "established here: {'someone1999 printed': 0, 'someone1999 ours': 0, 'this book': 1}",
+        "all: {'someone1999 printed': 1, 'someone1999 ours': 1, 'this book': 1}",
+    ]
+    assert claims.summary()._repr_html_().count("<tr") == 8
+    page = claims.scorecard("someone1999")._repr_html_()
+    assert '<a href="part/chapter.html#claim-ten">Fig. 1</a>' in page
+    assert "claim-own" not in page
+    assert repr(claims.scorecard("this book")) == "[established here] own: paper none, ours 10.5"
+    with pytest.raises(ClaimError, match="nobody"):
+        claims.scorecard("nobody")
+
+
+def test_under_a_claim_stands_whatever_its_verdict_hangs_on():
+    claim = make(
+        left_open="The unit.", revised=[{"was": "a factor of 5", "why": "One rule a word."}]
+    )
+    html = Badge(claim)._repr_html_()
+    for text in ("Left open: The unit.", "The rule was a factor of 5; changed: One rule a word."):
+        assert f'<div class="claim-reason">{text}</div>' in html
+    assert "Twice: Another way." in Badge(finding())._repr_html_()
+
+
+def test_rules_lists_every_word_with_those_that_depart_from_it(ledger):
+    bound = ENTRY.replace("reproduced_within = {{ abs = 1 }}", "").replace('"value"', '"bound"')
+    word = "[word.much]\nmeaning = 'a ratio'\nrule = {at_least = 10}\n"
+    same = bound.replace("= 10\n", "= {{at_least = 10}}\n").replace(
+        '"printed"', '"ours"\nword = "much"'
+    )
+    other = same.replace("at_least = 10", "at_least = 3").replace(
+        "word =", "own_rule = 'Four.'\nword ="
+    )
+    ledger(word, same.format(id="ten"), other.format(id="three"))
+    assert repr(claims.rules()) == "much: at least 10, 1 and 1 others"
+    html = claims.rules()._repr_html_()
+    assert "much: a ratio" in html
+    assert "three (at_least: 3): Four." in html
+    assert "<td>≥ 10</td><td>1</td><td>1</td>" in html
