@@ -285,11 +285,11 @@ def theorem_constants(a: Assumptions) -> tuple[float, float]:
 
     Notes
     -----
-    The proof reaches lambda_min through the lambda_t of (A.11), which may be smaller. The rate holds
-    all the same. With the Sigma of the step, (I - K H)^T P^-1 (I - K H) = (Sigma + Sigma H^T R^-1 H
-    Sigma)^-1 <= Sigma^-1 / (1 + s), where s = h_min^2 p_min (beta_min f_min)^2 / r_max because
-    Sigma > beta F P F^T beta, Eq. (19). So V contracts by s / (1 + s), which is never below
-    lambda_min.
+    The proof reaches lambda_min through the lambda_t of (A.11), which may be smaller. The rate
+    holds all the same. With the Sigma of the step, (I - K H)^T P^-1 (I - K H) =
+    (Sigma + Sigma H^T R^-1 H Sigma)^-1 <= Sigma^-1 / (1 + s), where
+    s = h_min^2 p_min (beta_min f_min)^2 / r_max because Sigma > beta F P F^T beta, Eq. (19). So V
+    contracts by s / (1 + s), which is never below lambda_min.
 
     References
     ----------

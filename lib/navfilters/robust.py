@@ -273,7 +273,8 @@ class AdaptiveEKF:
     memory : bool
         Whether each step multiplies the last one's E, instead of the identity: Q is an integrator.
     cap : float or array (...)
-        With ``memory``, the largest tr(E Q_0 E^T) / tr Q_0; E is scaled down to it. None is printed.
+        With ``memory``, the largest tr(E Q_0 E^T) / tr Q_0; E is scaled down to it. The text has
+        none.
 
     Raises
     ------
@@ -348,8 +349,10 @@ class AdaptiveEKF:
             kept = xp.asarray(self.cap) / growth
             E = xp.sqrt(xp.where(kept < 1, kept, 1.0))[..., None, None] * E
         prior = Gaussian(x, _spread(state.estimate, F, dynamics, E @ dynamics.Q @ E.mT))
+        estimate = _update(prior, z, sensor)
         factor = E if self.memory else state.factor
-        return AdaptiveState(_update(prior, z, sensor), window, count, factor)
+        factor = xp.broadcast_to(factor, (*estimate.mean.shape[:-1], *E.shape[-2:]))
+        return AdaptiveState(estimate, window, count, factor)
 
     def _factor(self, window: Array, full: Array) -> Array:
         """E of the class docstring, the identity for members whose window is not full."""
