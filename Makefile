@@ -6,10 +6,10 @@ BIN := $(VENV)/bin
 BUILT := _build/.complete
 BENCH := .venv-bench
 SOURCES := $(shell find book lib -type f -not -path '*/__pycache__/*' -not -name '.*' 2>/dev/null) \
-	_config.yml _toc.yml requirements.txt tools/execute_notebooks.py
+	_config.yml _toc.yml requirements.txt tools/execute_notebooks.py tools/executed.py
 
 .DEFAULT_GOAL := help
-.PHONY: help book test unit coverage lint notebooks nbval pages screens bench campaign lock clean
+.PHONY: help book test unit coverage lint notebooks nbval elsewhere spread pages screens bench campaign lock clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1  /p' $(MAKEFILE_LIST) | awk '{printf "  make %-10s", $$1; $$1 = ""; print}'
@@ -18,12 +18,12 @@ book: $(BUILT)  ## execute every notebook and build the HTML; warnings are error
 	@echo "The book is built. Open _build/html/index.html in a browser."
 
 $(BUILT): $(SOURCES) $(VENV)/.book
-	rm -rf _build
+	rm -rf _build/html _build/.jupyter_cache
 	$(BIN)/python tools/execute_notebooks.py
 	$(BIN)/jupyter-book build . --warningiserror --nitpick --keep-going
 	@touch $@
 
-test: lint coverage nbval pages  ## everything: lint, types, unit tests, notebooks, rendered pages
+test: lint coverage nbval elsewhere pages  ## everything: lint, types, unit tests, notebooks, rendered pages
 
 unit: $(VENV)/.test  ## unit and property tests alone, without the slow ones, in about a minute
 	$(BIN)/pytest tests --ignore tests/book -n 2 -m "not slow"
@@ -37,7 +37,14 @@ lint: $(VENV)/.test  ## ruff over code and notebooks, mypy over the library
 	$(BIN)/mypy
 
 nbval: $(VENV)/.test  ## run every notebook and compare with its stored outputs
-	$(BIN)/pytest book --nbval --nbval-current-env -n 2 --dist loadscope -p no:cacheprovider
+	PYTHONPATH=$(CURDIR)/tools $(BIN)/pytest book --nbval --nbval-current-env -n 2 --dist loadscope \
+		-p no:cacheprovider -p keep_executed
+
+elsewhere: $(VENV)/.test  ## the same without AVX-512, and with another BLAS kernel on one thread
+	$(BIN)/python tools/nbval_elsewhere.py
+
+spread: $(VENV)/.test  ## how far each claim moves with last bits and processors: about an hour
+	$(BIN)/python tools/spread.py --store
 
 pages: $(VENV)/.test $(BUILT)  ## the ledger, the stored notebooks, and the built pages in a browser
 	$(BIN)/pytest tests/book

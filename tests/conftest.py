@@ -1,8 +1,35 @@
-"""One deterministic hypothesis profile, so that a failure is a failure for everybody."""
+"""One deterministic hypothesis profile, so that a failure is everybody's; JAX if it is there."""
 
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
 from hypothesis import settings
 
 settings.register_profile(
     "deterministic", derandomize=True, deadline=None, max_examples=50, database=None
 )
 settings.load_profile("deterministic")
+
+# JAX has no wheels for Macs with Intel processors, and requirements-test.in asks for none there.
+HAS_JAX = importlib.util.find_spec("jax") is not None
+WITH_JAX = [
+    path
+    for path in Path(__file__).parent.rglob("test_*.py")
+    if re.search(r"^import jax$", path.read_text(encoding="utf-8"), re.M)
+]
+collect_ignore = [] if HAS_JAX else WITH_JAX
+
+
+def pytest_report_header():
+    if not HAS_JAX:
+        return f"without JAX, {len(WITH_JAX)} files and all tests of its engine are left out"
+    return None
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        engine = item.callspec.params.get("engine") if hasattr(item, "callspec") else None
+        if engine == "jax" and not HAS_JAX:
+            item.add_marker(pytest.mark.skip(reason="needs JAX"))

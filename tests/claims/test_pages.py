@@ -104,3 +104,40 @@ def test_rules_lists_every_word_with_those_that_depart_from_it(ledger):
     assert "much: a ratio" in html
     assert "three (at_least: 3): Four." in html
     assert "<td>≥ 10</td><td>1</td><td>1</td>" in html
+
+
+STATEMENT = """
+[[statement]]
+id = "{id}"
+work = "someone1999"
+section = "II"
+what = "number"
+text = "It is <ten>."
+{state}
+"""
+
+
+def test_statements_counts_what_is_checked_set_aside_and_open(ledger, tmp_path):
+    ledger(ENTRY.format(id="ten"))
+    states = ("claims = ['ten']", "set_aside = 'A definition.'", "open = 'The sum.'")
+    texts = [STATEMENT.format(id=f"s-{i}", state=s) for i, s in enumerate(states)]
+    (tmp_path / "book" / "statements.toml").write_text("".join(texts), encoding="utf-8")
+    page = claims.statements()
+    assert repr(page) == "someone1999: {'all': 3, 'checked': 1, 'set aside': 1, 'open': 1}"
+    assert "<td>3</td><td>1</td><td>1</td><td>1</td>" in page._repr_html_()
+    assert "section II: It is &lt;ten&gt;. A claim would compute: The sum." in page._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("states", "message"),
+    [
+        ((("a", ""),), "a: exactly one"),
+        ((("a", "open = 'x'\nset_aside = 'y'"),), "a: exactly one"),
+        ((("a", "open = 'x'"), ("a", "open = 'y'")), "two statements of one id"),
+    ],
+)
+def test_a_malformed_list_of_statements_is_refused(tmp_path, states, message):
+    path = tmp_path / "statements.toml"
+    path.write_text("".join(STATEMENT.format(id=i, state=s) for i, s in states), encoding="utf-8")
+    with pytest.raises(ClaimError, match=message):
+        claims.load_statements(path)

@@ -24,6 +24,7 @@ from .ledger import (
     load_words,
 )
 from .pages import Badge, Page, rules, scorecard, summary
+from .statements import Statement, load_statements, statements
 from .verdicts import Parts, Readings, Some, derive
 
 __all__ = [
@@ -41,13 +42,16 @@ __all__ = [
     "Parts",
     "Readings",
     "Some",
+    "Statement",
     "Word",
     "check",
     "derive",
     "find",
     "load",
+    "load_statements",
     "load_words",
     "rules",
     "scorecard",
+    "statements",
     "summary",
 ]

@@ -79,11 +79,11 @@ def summary() -> Page:
         rows.append(f'<tr class="claim-{_slug(verdict)}"><th>{verdict}</th>{cells}</tr>')
         named = (f"{s} {t}" if t else s for s, t in columns)
         lines.append(f"{verdict}: {dict(zip(named, found, strict=True))}")
-    table = (
+    counted = (
         f'<table class="claims-summary"><tr><th>verdict</th>{head}</tr>'
         f"<tr><th>limit</th>{below}</tr>{''.join(rows)}</table>"
     )
-    return Page(_scrolling(table), "\n".join(lines))
+    return Page(_scrolling(counted), "\n".join(lines))
 
 
 def scorecard(work: str) -> Page:
@@ -118,8 +118,8 @@ def scorecard(work: str) -> Page:
             f'<td>{_rich(c.ours)}</td><td class="claim-{_slug(c.verdict)}">'
             f'<span class="claim-verdict">{c.verdict}</span></td></tr>'
         )
-    table = _table("claims-table", ("claim", "paper", "ours", "verdict"), rows)
-    return Page(table, "\n".join(repr(Badge(c)) for c in chosen))
+    page = table("claims-table", ("claim", "paper", "ours", "verdict"), rows)
+    return Page(page, "\n".join(repr(Badge(c)) for c in chosen))
 
 
 def rules() -> Page:
@@ -143,8 +143,8 @@ def rules() -> Page:
             f"<td>{_rule(word.rule)}</td><td>{same}</td><td>{len(using) - same}</td></tr>"
         )
         lines.append(f"{name}: {_plain_rule(word.rule)}, {same} and {len(using) - same} others")
-    table = _table("claims-table claims-rules", ("word", "rule", "claims", "others"), rows)
-    return Page(table, "\n".join(lines))
+    head = ("word", "rule", "claims", "others")
+    return Page(table("claims-table claims-rules", head, rows), "\n".join(lines))
 
 
 def _at(claim: Claim) -> str:
@@ -176,7 +176,8 @@ def _scrolling(table: str) -> str:
     return f'<div class="claims-scroll">{table}</div>'
 
 
-def _table(style: str, head: Sequence[str], rows: Sequence[str]) -> str:
+def table(style: str, head: Sequence[str], rows: Sequence[str]) -> str:
+    """A table that may scroll sideways."""
     top = "".join(f"<th>{title}</th>" for title in head)
     return _scrolling(f'<table class="{style}"><tr>{top}</tr>{"".join(rows)}</table>')
 
