@@ -252,11 +252,14 @@ class AdaptiveState(NamedTuple):
         The last innovations, the newest at the end; zeros before the first.
     count : int array (...)
         Innovations so far.
+    factor : array (..., n, n)
+        E of the last step; the identity at first and without ``memory``.
     """
 
     estimate: Gaussian
     innovations: Array
     count: Array
+    factor: Array
 
 
 def _paper_directions() -> np.ndarray:
@@ -286,6 +289,11 @@ class AdaptiveEKF:
     current : bool
         Whether the newest y_j is that of the step itself, which is known before Q because it
         depends on the predicted mean alone, instead of that of the step before.
+    memory : bool
+        Whether each step multiplies the last one's E, instead of the identity: Q is an integrator.
+    cap : float or array (...)
+        With ``memory``, the largest tr(E Q_0 E^T) / tr Q_0; E is scaled down to it. The text has
+        none.
 
     Raises
     ------
@@ -299,8 +307,9 @@ class AdaptiveEKF:
     A M A^T is meant. (45) has H M H^T with H (m, n): H^T M H is meant, and since H is about 1e-7
     rad/m its exponent is below 1e-12 and nothing is tuned; A, which (44) defines for this, takes
     its place. Q_t = Q_{t-1} expm(...) is not symmetric, and as a product over the steps it
-    explodes: here Q_0 is enlarged afresh at each step, by the half exponent from both sides, which
-    is Q_0 expm(A M A^T) when the two commute and M is symmetric, and always a covariance. (46) is
+    explodes unless it is capped (``memory``, ``cap``): by default Q_0 is enlarged afresh at each
+    step, by the half exponent from both sides, which is Q_0 expm(A M A^T) when the two commute and
+    M is symmetric, and always a covariance. (46) is
     printed for i = 1, 2 and holds for C_0 too. It ends with y_t, and whether Q_t enters the
     prediction of t or of t + 1 is open: a prediction is made before the measurement, so the second
     is the default, and ``current`` is the first. Until N + k innovations exist, Q is Q_0. The k
@@ -318,14 +327,19 @@ class AdaptiveEKF:
     N: int = 15
     directions: Array = field(default_factory=_paper_directions, metadata={"axes": 2})
     current: bool = False
+    memory: bool = False
+    cap: Array = np.inf
 
     def __post_init__(self) -> None:
         validation.real_array("a", self.a, "")
+        if not (np.asarray(self.cap) > 0).all():
+            raise ValueError(f"cap must be positive; found {self.cap}")
         checked = {
             "k": validation.whole_number("k", self.k, 1),
             "N": validation.whole_number("N", self.N, 2),
             "directions": validation.real_array("directions", self.directions, "n, m"),
             "current": validation.flag("current", self.current),
+            "memory": validation.flag("memory", self.memory),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
@@ -336,7 +350,10 @@ class AdaptiveEKF:
         xp = prior.mean.__array_namespace__()
         count = _zeros(prior)
         window = (*count.shape, self.N + self.k, np.shape(self.directions)[-1])
-        return AdaptiveState(prior, xp.zeros(window), count)
+        n = prior.mean.shape[-1]
+        return AdaptiveState(
+            prior, xp.zeros(window), count, xp.zeros((*count.shape, n, n)) + xp.eye(n)
+        )
 
     def step(
         self, state: AdaptiveState, z: Array, dynamics: Dynamics, sensor: MeasurementModel
@@ -351,9 +368,17 @@ class AdaptiveEKF:
         count = xp.broadcast_to(state.count + 1, y.shape[:-2])
         used, exist = (window, count) if self.current else (past, count - 1)
         E = self._factor(used, (exist >= self.N + self.k)[..., None, None])
-        Q = E @ _noise(state.estimate, dynamics) @ E.mT
-        prior = Gaussian(x, _spread(state.estimate, F, dynamics, Q))
-        return AdaptiveState(_update(prior, z, sensor), window, count)
+        noise = _noise(state.estimate, dynamics)
+        if self.memory:
+            E = E @ state.factor
+            growth = xp.linalg.trace(E @ noise @ E.mT) / xp.linalg.trace(noise)
+            kept = xp.asarray(self.cap) / growth
+            E = xp.sqrt(xp.where(kept < 1, kept, 1.0))[..., None, None] * E
+        prior = Gaussian(x, _spread(state.estimate, F, dynamics, E @ noise @ E.mT))
+        estimate = _update(prior, z, sensor)
+        factor = E if self.memory else state.factor
+        factor = xp.broadcast_to(factor, (*estimate.mean.shape[:-1], *E.shape[-2:]))
+        return AdaptiveState(estimate, window, count, factor)
 
     def _factor(self, window: Array, full: Array) -> Array:
         """E of the class docstring, the identity for members whose window is not full."""
