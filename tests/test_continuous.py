@@ -467,3 +467,50 @@ def test_an_integration_that_stops_says_where():
     prior = Gaussian(np.ones(1), np.zeros((1, 1)))
     with pytest.raises(RuntimeError, match=r"integration stopped at t = (1|0\.99)"):
         extended_kalman_bucy(escape, prior, lambda t: np.zeros(1), [0.0, 2.0])
+
+
+# Functions that no complex step goes through.
+
+PLAIN = ContinuousSystem(lambda x, u, w, t: -x + w, lambda x, v, t: x + v, [[0.1]], [[0.1]])
+HIDDEN = {
+    "A": {"f": lambda x, u, w, t: -x - 0.1 * x * abs(x) + w},
+    "L": {"f": lambda x, u, w, t: -x + w + 0.1 * np.linalg.norm(w + 1)},
+    "C": {"h": lambda x, v, t: x + 0.1 * np.sqrt(np.vecdot(x + 2, x + 2)) + v},
+    "M": {"h": lambda x, v, t: x + v + 0.1 * (v + 1).real},
+    "A, where it ends": {
+        "f": lambda x, u, w, t: np.where(x.real < 5, 3 + 0 * x, 3 + abs(x - 5)) + w
+    },
+}
+
+
+@pytest.mark.parametrize("case", HIDDEN)
+def test_a_function_that_is_not_analytic_is_refused(case):
+    system = replace(PLAIN, **HIDDEN[case])
+    prior = Gaussian(np.zeros(1), np.eye(1))
+    with pytest.raises(TypeError, match=r"system\.[fh] must be analytic"):
+        extended_kalman_bucy(system, prior, lambda t: 8 * np.ones(1), [0.0, 3.0])
+
+
+@pytest.mark.parametrize("case", ["A", "L", "C", "M"])
+def test_it_is_refused_about_a_reference(case):
+    system = replace(PLAIN, **HIDDEN[case])
+    x = solve_ivp(
+        lambda t, x: system.f(x, np.zeros(0), np.zeros(1), t),
+        (0, 3),
+        [2.0],
+        rtol=1e-10,
+        atol=1e-10,
+        dense_output=True,
+    ).sol
+    prior = Gaussian(np.zeros(1), np.eye(1))
+    with pytest.raises(TypeError, match=r"system\.[fh] must be analytic"):
+        linearized_kalman_bucy(system, Reference(x), prior, lambda t: np.ones(1), [0.0, 3.0])
+
+
+def test_the_inputs_jacobian_too():
+    system = replace(PLAIN, f=lambda x, u, w, t: -x + w + 0.1 * abs(u) + u)
+    u = lambda t: np.ones(1)  # noqa: E731
+    x = solve_ivp(lambda t, x: -x + 1.1, (0, 3), [2.0], "DOP853", dense_output=True, rtol=1e-11).sol
+    prior = Gaussian(np.zeros(1), np.eye(1))
+    with pytest.raises(TypeError, match=r"system\.f must be analytic"):
+        linearized_kalman_bucy(system, Reference(x, u), prior, lambda t: np.ones(1), [0.0, 3.0])

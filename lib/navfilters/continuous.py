@@ -7,13 +7,14 @@ only the upper triangle, so that it cannot become asymmetric.
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from navfilters import validation
-from navfilters.derivatives import check_model, jacobian, probe
+from navfilters.derivatives import around, check_model, examine, jacobian, probe
 from navfilters.types import Array, Gaussian
 
 Signal = Callable[[float], Array]
@@ -37,7 +38,8 @@ class ContinuousSystem:
         (x, u, w, t) -> (n, n), (n, m), (n, w): the Jacobians of f in x, u and w.
     C, M : callable, optional
         (x, v, t) -> (p, n), (p, v): the Jacobians of h in x and v. Those not given are computed by
-        :func:`~navfilters.derivatives.complex_step`.
+        :func:`~navfilters.derivatives.complex_step`, and compared with differences at the start
+        and the end of a filter: f and h must be analytic, without abs, norm or .real.
 
     Raises
     ------
@@ -75,9 +77,17 @@ class ContinuousSystem:
         -------
         callable
         """
-        if name in "ABL":
-            return jacobian(self.f, "ABL".index(name), getattr(self, name), name="system.f")
-        return jacobian(self.h, "CM".index(name), getattr(self, name), name="system.h")
+        return self._jacobians[name]
+
+    @cached_property
+    def _jacobians(self) -> dict[str, Callable[..., Array]]:
+        """All five; one object each, which knows whether it was compared with differences."""
+        owners = {"f": "ABL", "h": "CM"}
+        return {
+            J: jacobian(getattr(self, f), i, getattr(self, J), name=f"system.{f}")
+            for f, names in owners.items()
+            for i, J in enumerate(names)
+        }
 
 
 @dataclass(frozen=True)
@@ -197,6 +207,8 @@ def linearized_kalman_bucy(
     at = x_ref(t[0]), u_ref(t[0]), w_ref(t[0]), t[0]
     if at[1].size:
         probe("system.B", system.jacobian("B"), at, (at[0].size, at[1].size))
+    for s in (t[0], t[t.size // 2], t[-1]):
+        _examine(system, [x_ref(s)], u_ref(s), w_ref(s), v_ref(s), s)
     _check_reference(system, reference, t, residual_tol)
     A, B, L, C, M = (system.jacobian(name) for name in "ABLCM")
 
@@ -266,6 +278,7 @@ def extended_kalman_bucy(
     u = _signal("u", u, t[0], None)
     no_w, no_v = np.zeros(len(system.Q)), np.zeros(len(system.R))
     _probe(system, prior.mean, u(t[0]), no_w, no_v, t[0], y0.size)
+    _examine(system, around(prior), u(t[0]), no_w, no_v, t[0])
     A, L, C, M = (system.jacobian(name) for name in "ALCM")
 
     def model(s, x):
@@ -273,7 +286,9 @@ def extended_kalman_bucy(
         innovation = y(s) - system.h(*sensing)
         return system.f(*at), innovation, A(*at), L(*at), C(*sensing), M(*sensing)
 
-    return _integrate(system, model, prior, t, rtol, atol, method, None)
+    trajectory = _integrate(system, model, prior, t, rtol, atol, method, None)
+    _examine(system, [trajectory.mean[-1]], u(t[-1]), no_w, no_v, t[-1])
+    return trajectory
 
 
 def reference_residual(
@@ -410,6 +425,15 @@ def _probe(system, x, u, w, v, t, p) -> None:
     probe("system.C", system.jacobian("C"), sensing, (p, n))
     M = probe("system.M", system.jacobian("M"), sensing, (p, v.size))
     validation.covariance("M R M^T, from system.M and system.R,", M @ system.R @ M.T, definite=True)
+
+
+def _examine(system, states, u, w, v, t) -> None:
+    """The automatic Jacobians against differences, at some states."""
+    with np.errstate(all="ignore"):
+        for name in "ABL" if u.size else "AL":
+            examine(system.jacobian(name), [(x, u, w, t) for x in states])
+        for name in "CM":
+            examine(system.jacobian(name), [(x, v, t) for x in states])
 
 
 def _integrate(system, model, start, t, rtol, atol, method, origin) -> Trajectory:

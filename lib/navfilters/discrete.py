@@ -7,12 +7,13 @@ The update is :func:`~navfilters.filters.kalman_update`, the one of every other 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from navfilters import validation
-from navfilters.derivatives import check_model, jacobian, probe
+from navfilters.derivatives import around, check_model, examine, jacobian, probe
 from navfilters.filters import kalman_update
 from navfilters.types import Array, Gaussian, Moments
 
@@ -35,7 +36,8 @@ class DiscreteSystem:
         (x, u, w, k) -> (..., n, n) and (..., n, w): the Jacobians of f in x and w.
     H, M : callable, optional
         (x, v, k) -> (..., p, n) and (..., p, v): the Jacobians of h in x and v. Those not given are
-        computed by :func:`~navfilters.derivatives.complex_step`.
+        computed by :func:`~navfilters.derivatives.complex_step`, and compared with differences
+        when they are first needed: f and h must be analytic, without abs, norm or .real.
 
     Raises
     ------
@@ -61,6 +63,17 @@ class DiscreteSystem:
     def __post_init__(self) -> None:
         check_model(self, ("f", "h"), ("F", "L", "H", "M"))
 
+    @cached_property
+    def _jacobians(self) -> dict[str, Callable[..., Array]]:
+        """F, L, H and M, given or by complex step; one object each, which knows its past."""
+        of_f = (self.f, "system.f")
+        of_h = (self.h, "system.h")
+        wanted = {"F": (*of_f, 0), "L": (*of_f, 2), "H": (*of_h, 0), "M": (*of_h, 1)}
+        return {
+            J: jacobian(function, position, getattr(self, J), name=name)
+            for J, (function, name, position) in wanted.items()
+        }
+
     def motion_jacobians(self, x: Array, u: Array, k: int) -> tuple[Array, Array]:
         """F (..., n, n) and L (..., n, w) at the state x, with w = 0: Eqs. (81)-(82).
 
@@ -76,9 +89,7 @@ class DiscreteSystem:
         tuple of array
         """
         at = x, u, np.zeros(len(self.Q)), k
-        F = jacobian(self.f, 0, self.F, name="system.f")
-        L = jacobian(self.f, 2, self.L, name="system.f")
-        return F(*at), L(*at)
+        return self._jacobians["F"](*at), self._jacobians["L"](*at)
 
     def measurement_jacobians(self, x: Array, k: int) -> tuple[Array, Array]:
         """H (..., p, n) and M (..., p, v) at the state x, with v = 0: Eqs. (85)-(86).
@@ -94,9 +105,7 @@ class DiscreteSystem:
         tuple of array
         """
         at = x, np.zeros(len(self.R)), k
-        H = jacobian(self.h, 0, self.H, name="system.h")
-        M = jacobian(self.h, 1, self.M, name="system.h")
-        return H(*at), M(*at)
+        return self._jacobians["H"](*at), self._jacobians["M"](*at)
 
 
 def predict(system: DiscreteSystem, posterior: Gaussian, u: Array, k: int) -> Gaussian:
@@ -208,6 +217,7 @@ def extended_kalman_filter(
         for k in range(len(y)):
             state = update(system, predict(system, state, u[k], k), y[k], k + 1)
             states.append(state)
+        _examine(system, [state.mean], u[-1], len(y) - 1)  # where it has come to
     return Gaussian(np.stack([s.mean for s in states]), np.stack([s.cov for s in states]))
 
 
@@ -234,12 +244,21 @@ def _check(system: DiscreteSystem, prior: Gaussian, y: np.ndarray, u: np.ndarray
     prior = Gaussian(
         np.broadcast_to(prior.mean, (*batch, n)), np.broadcast_to(prior.cov, (*batch, n, n))
     )
-    at = prior.mean, u[0], np.zeros(w), 0
+    at, sensing = (prior.mean, u[0], np.zeros(w), 0), (prior.mean, np.zeros(v), 1)
+    J = system._jacobians
     probe("system.f", system.f, at, (n,))
-    probe("system.F", jacobian(system.f, 0, system.F, name="system.f"), at, (n, n))
-    probe("system.L", jacobian(system.f, 2, system.L, name="system.f"), at, (n, w))
-    sensing = prior.mean, np.zeros(v), 1
+    probe("system.F", J["F"], at, (n, n))
+    probe("system.L", J["L"], at, (n, w))
     probe("system.h", system.h, sensing, (p,))
-    probe("system.H", jacobian(system.h, 0, system.H, name="system.h"), sensing, (p, n))
-    probe("system.M", jacobian(system.h, 1, system.M, name="system.h"), sensing, (p, v))
+    probe("system.H", J["H"], sensing, (p, n))
+    probe("system.M", J["M"], sensing, (p, v))
+    with np.errstate(all="ignore"):
+        _examine(system, around(prior), u[0], 0)
     return prior
+
+
+def _examine(system: DiscreteSystem, states: list[np.ndarray], u: np.ndarray, k: int) -> None:
+    """The automatic Jacobians against differences: f's from step k, h's at the step after it."""
+    no_w, no_v = np.zeros(len(system.Q)), np.zeros(len(system.R))
+    for name, J in system._jacobians.items():
+        examine(J, [(x, u, no_w, k) if name in "FL" else (x, no_v, k + 1) for x in states])
