@@ -7,13 +7,15 @@ The update is :func:`~navfilters.filters.kalman_update`, the one of every other 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from navfilters import validation
-from navfilters.derivatives import check_model, jacobian, probe
+from navfilters.derivatives import around, check_model, examine, jacobian
 from navfilters.filters import kalman_update
+from navfilters.probing import members
 from navfilters.types import Array, Gaussian, Moments
 
 
@@ -35,7 +37,8 @@ class DiscreteSystem:
         (x, u, w, k) -> (..., n, n) and (..., n, w): the Jacobians of f in x and w.
     H, M : callable, optional
         (x, v, k) -> (..., p, n) and (..., p, v): the Jacobians of h in x and v. Those not given are
-        computed by :func:`~navfilters.derivatives.complex_step`.
+        computed by :func:`~navfilters.derivatives.complex_step`, and compared with differences
+        when they are first needed: f and h must be analytic, without abs, norm or .real.
 
     Raises
     ------
@@ -61,6 +64,17 @@ class DiscreteSystem:
     def __post_init__(self) -> None:
         check_model(self, ("f", "h"), ("F", "L", "H", "M"))
 
+    @cached_property
+    def _jacobians(self) -> dict[str, Callable[..., Array]]:
+        """F, L, H and M, given or by complex step; one object each, which knows its past."""
+        of_f = (self.f, "system.f")
+        of_h = (self.h, "system.h")
+        wanted = {"F": (*of_f, 0), "L": (*of_f, 2), "H": (*of_h, 0), "M": (*of_h, 1)}
+        return {
+            J: jacobian(function, position, getattr(self, J), name=name)
+            for J, (function, name, position) in wanted.items()
+        }
+
     def motion_jacobians(self, x: Array, u: Array, k: int) -> tuple[Array, Array]:
         """F (..., n, n) and L (..., n, w) at the state x, with w = 0: Eqs. (81)-(82).
 
@@ -75,10 +89,9 @@ class DiscreteSystem:
         -------
         tuple of array
         """
-        at = x, u, np.zeros(len(self.Q)), k
-        F = jacobian(self.f, 0, self.F, name="system.f")
-        L = jacobian(self.f, 2, self.L, name="system.f")
-        return F(*at), L(*at)
+        at, n = (x, u, np.zeros(len(self.Q)), k), x.shape[-1]
+        F, L = self._jacobians["F"](*at), self._jacobians["L"](*at)
+        return _fits("system.F", F, (n, n)), _fits("system.L", L, (n, len(self.Q)))
 
     def measurement_jacobians(self, x: Array, k: int) -> tuple[Array, Array]:
         """H (..., p, n) and M (..., p, v) at the state x, with v = 0: Eqs. (85)-(86).
@@ -94,9 +107,9 @@ class DiscreteSystem:
         tuple of array
         """
         at = x, np.zeros(len(self.R)), k
-        H = jacobian(self.h, 0, self.H, name="system.h")
-        M = jacobian(self.h, 1, self.M, name="system.h")
-        return H(*at), M(*at)
+        H, M = self._jacobians["H"](*at), self._jacobians["M"](*at)
+        H = _fits("system.H", H, (np.shape(H)[-2] if np.ndim(H) > 1 else 1, x.shape[-1]))
+        return H, _fits("system.M", M, (H.shape[-2], len(self.R)))
 
 
 def predict(system: DiscreteSystem, posterior: Gaussian, u: Array, k: int) -> Gaussian:
@@ -124,9 +137,11 @@ def predict(system: DiscreteSystem, posterior: Gaussian, u: Array, k: int) -> Ga
     lecture16, Eqs. (81)-(84), whose index k is k + 1 here; L_k in (49) is the
     L_{k-1} of (84).
     """
+    posterior, u = _given("posterior", posterior), validation.given("u", u)
     F, L = system.motion_jacobians(posterior.mean, u, k)
     P = F @ posterior.cov @ F.mT + L @ system.Q @ L.mT
-    return Gaussian(system.f(posterior.mean, u, np.zeros(len(system.Q)), k), (P + P.mT) / 2)
+    moved = system.f(posterior.mean, u, np.zeros(len(system.Q)), k)
+    return Gaussian(_fits("system.f", moved, posterior.mean.shape[-1:]), (P + P.mT) / 2)
 
 
 def update(system: DiscreteSystem, prior: Gaussian, y: Array, k: int) -> Gaussian:
@@ -155,10 +170,11 @@ def update(system: DiscreteSystem, prior: Gaussian, y: Array, k: int) -> Gaussia
     lecture16, Eqs. (85)-(91). (66) carries a noise term that its own expectation removes; (68) and
     (87) have the estimate x_hat where they print x.
     """
+    prior, y = _given("prior", prior), validation.given("y", y)
     H, M = system.measurement_jacobians(prior.mean, k)
     P_xz = prior.cov @ H.mT
     S = H @ P_xz + M @ system.R @ M.mT
-    y_hat = system.h(prior.mean, np.zeros(len(system.R)), k)
+    y_hat = _fits("system.h", system.h(prior.mean, np.zeros(len(system.R)), k), y.shape[-1:])
     return kalman_update(prior, y, Moments(y_hat, S, P_xz))
 
 
@@ -208,7 +224,19 @@ def extended_kalman_filter(
         for k in range(len(y)):
             state = update(system, predict(system, state, u[k], k), y[k], k + 1)
             states.append(state)
+        _examine(system, [state.mean], u[-1], len(y) - 1)  # where it has come to
     return Gaussian(np.stack([s.mean for s in states]), np.stack([s.cov for s in states]))
+
+
+def _fits(name: str, value: Any, shape: tuple[int, ...]) -> Array:
+    """What a function gave, as an array with these trailing axes."""
+    return validation.core(name, validation.given(name, value), shape)
+
+
+def _given(name: str, value: Gaussian) -> Gaussian:
+    """A Gaussian of arrays that fit together; their values are not looked at."""
+    mean = validation.given(f"{name}.mean", value.mean)
+    return Gaussian(mean, _fits(f"{name}.cov", value.cov, mean.shape[-1:] * 2))
 
 
 def _per_step(name: str, value: Any, axes: str) -> np.ndarray:
@@ -234,12 +262,21 @@ def _check(system: DiscreteSystem, prior: Gaussian, y: np.ndarray, u: np.ndarray
     prior = Gaussian(
         np.broadcast_to(prior.mean, (*batch, n)), np.broadcast_to(prior.cov, (*batch, n, n))
     )
-    at = prior.mean, u[0], np.zeros(w), 0
-    probe("system.f", system.f, at, (n,))
-    probe("system.F", jacobian(system.f, 0, system.F, name="system.f"), at, (n, n))
-    probe("system.L", jacobian(system.f, 2, system.L, name="system.f"), at, (n, w))
-    sensing = prior.mean, np.zeros(v), 1
-    probe("system.h", system.h, sensing, (p,))
-    probe("system.H", jacobian(system.h, 0, system.H, name="system.h"), sensing, (p, n))
-    probe("system.M", jacobian(system.h, 1, system.M, name="system.h"), sensing, (p, v))
+    at, sensing = (prior.mean, u[0], np.zeros(w), 0), (prior.mean, np.zeros(v), 1)
+    J = system._jacobians
+    members("system.f", system.f, at, 2, (n,), batch, whole=True)
+    members("system.F", J["F"], at, 2, (n, n), batch, whole=False)
+    members("system.L", J["L"], at, 2, (n, w), batch, whole=False)
+    members("system.h", system.h, sensing, 1, (p,), batch, whole=True)
+    members("system.H", J["H"], sensing, 1, (p, n), batch, whole=False)
+    members("system.M", J["M"], sensing, 1, (p, v), batch, whole=False)
+    with np.errstate(all="ignore"):
+        _examine(system, around(prior), u[0], 0)
     return prior
+
+
+def _examine(system: DiscreteSystem, states: list[np.ndarray], u: np.ndarray, k: int) -> None:
+    """The automatic Jacobians against differences: f's from step k, h's at the step after it."""
+    no_w, no_v = np.zeros(len(system.Q)), np.zeros(len(system.R))
+    for name, J in system._jacobians.items():
+        examine(J, [(x, u, no_w, k) if name in "FL" else (x, no_v, k + 1) for x in states])

@@ -13,6 +13,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from navfilters._extras import command
 from navfilters._progress import progress as progress_bar
 from navfilters.consistency import mean_nees, sample_deviation
 from navfilters.experiments.sar_images import FULL, ImageTable, Imaging, same_images, tabulate
@@ -282,4 +283,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

@@ -6,6 +6,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from navfilters import validation
+from navfilters._analytic import dot
 from navfilters.attitude import cross_matrix, matrix
 from navfilters.frames import antenna_axes
 from navfilters.types import Array
@@ -228,7 +229,13 @@ class SarGeometry:
         ----------
         pogorelsky2020, Eqs. (29), (33).
         """
-        r_f = measurement.r_f
+        measurement = Measurement(
+            *(
+                validation.given(f"measurement.{name}", part)
+                for name, part in measurement._asdict().items()
+            )
+        )
+        r_f = validation.core("measurement.r_f", measurement.r_f, (3,))
         xp = r_f.__array_namespace__()
         seen = xp.stack([measurement.slant_range, measurement.speed], axis=-1)
         y = xp.concat([xp.zeros_like(seen), seen], axis=-1)
@@ -270,4 +277,4 @@ def _apply(T: Array, v: Array) -> Array:
 def _norm(v: Array) -> Array:
     """|v|, (..., 1)."""
     xp = v.__array_namespace__()
-    return xp.sqrt(xp.linalg.vecdot(v, v))[..., None]
+    return xp.sqrt(dot(v, v))[..., None]
