@@ -74,8 +74,10 @@ def radar(method):
 
 
 def residual(state, r_f):
-    distance = np.linalg.norm(PIXEL) + 0 * r_f[..., 0]
-    return RADAR.linearize(state, Measurement(r_f, distance, distance))[0]
+    """Of a measurement that is what it is, whatever the state: no derivative in r_f."""
+    distance = np.linalg.norm(PIXEL)
+    pixel = np.broadcast_to(PIXEL, r_f.shape)
+    return RADAR.linearize(state, Measurement(pixel, distance, distance))[0]
 
 
 def intersection(x):

@@ -15,6 +15,7 @@ from uuid import uuid4
 import numpy as np
 
 from navfilters import validation
+from navfilters._extras import needed
 from navfilters.sweeping import workers as places
 from navfilters.sweeping.checkpoints import Checkpoint
 from navfilters.sweeping.chunks import Chunk, Job, Kept, SweepError, compute
@@ -213,9 +214,7 @@ def _doubles(engine: str) -> Any:
     """Where JAX's arrays are as they will be when it computes."""
     if engine == "numpy":
         return nullcontext()
-    import jax
-
-    return jax.enable_x64(True)
+    return needed("jax", "navfilters[jax]", 'engine="jax"').enable_x64(True)
 
 
 def _place(job: Job, problem: Problem, client: Any, workers: int | None) -> Callable[..., Iterator]:
