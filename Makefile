@@ -8,6 +8,34 @@ BENCH := .venv-bench
 SOURCES := $(shell find book lib -type f -not -path '*/__pycache__/*' -not -name '.*' 2>/dev/null) \
 	_config.yml _toc.yml requirements.txt tools/execute_notebooks.py tools/executed.py
 
+# Everything runs in .venv, with .venv's settings: what the shell has of packages (ROS sets PYTHONPATH),
+# start-up files, kernels named python3, styles and pip options stays outside.
+unexport PYTHONPATH PYTHONHOME PYTHONSTARTUP PYTHONOPTIMIZE PYTHONWARNINGS PYTHONSAFEPATH PYTHONINSPECT
+unexport JUPYTER_CONFIG_PATH MATPLOTLIBRC MPLBACKEND PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT
+export PYTHONNOUSERSITE := 1
+export PYTHONUTF8 := 1
+export JUPYTER_PREFER_ENV_PATH := 1
+export JUPYTER_PATH := $(CURDIR)/$(VENV)/share/jupyter
+export JUPYTER_DATA_DIR := $(JUPYTER_PATH)
+export JUPYTER_CONFIG_DIR := $(CURDIR)/$(VENV)/etc/jupyter
+export IPYTHONDIR := $(CURDIR)/$(VENV)/etc/ipython
+export MPLCONFIGDIR := $(CURDIR)/$(VENV)/etc/matplotlib
+
+# An environment is made anew if it lacks pip or a file that pip has listed (an installation that was
+# stopped), or if it is another folder's: moved or copied.
+MOVED := $(shell for f in $(VENV)/lib/python3*/site-packages/_*navfilters.pth; do \
+	test ! -f "$$f" || grep -qxF "$$(pwd -P)/lib" "$$f" || echo moved; done)
+ifneq ($(MOVED),)
+.PHONY: $(VENV)/.book
+endif
+WHOLE := import sys, importlib.metadata as m, pip._internal.cli.main; sys.exit(not all(d.files and \
+	all(f.locate().exists() for f in d.files if f.suffix != ".pyc") for d in m.distributions()))
+define made
+@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	{ echo 'Python 3.11 or newer is needed, as in: make book PYTHON=python3.13' >&2; exit 1; }
+test -z "$(2)" && $(1)/bin/python -c '$(WHOLE)' >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(1)
+endef
+
 .DEFAULT_GOAL := help
 .PHONY: help book test unit coverage lint notebooks nbval elsewhere spread pages screens bench campaign lock clean
 
@@ -66,7 +94,7 @@ campaign: $(VENV)/.book  ## the closed loop at the paper's size; stopped, it goe
 
 lock:  ## refresh the three requirements.txt from their .in lists
 	$(PYTHON) -m venv _build/lock
-	_build/lock/bin/pip install --quiet uv
+	_build/lock/bin/python -m pip install --quiet uv
 	_build/lock/bin/uv pip compile --quiet --upgrade --universal --generate-hashes \
 		--python-version 3.11 requirements.in -o requirements.txt
 	_build/lock/bin/uv pip compile --quiet --upgrade --universal --generate-hashes \
@@ -75,20 +103,21 @@ lock:  ## refresh the three requirements.txt from their .in lists
 		--python-version 3.11 benchmarks/requirements.in -o benchmarks/requirements.txt
 
 $(VENV)/.book: requirements.txt pyproject.toml
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.txt
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	$(call made,$(VENV),$(MOVED))
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	$(BIN)/python -c 'import matplotlib.font_manager'  # makes its cache
 	@touch $@
 
 $(VENV)/.test: requirements-test.txt $(VENV)/.book
-	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-test.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-test.txt
 	@touch $@
 
 $(BENCH)/.ready: benchmarks/requirements.txt pyproject.toml
-	test -x $(BENCH)/bin/python || $(PYTHON) -m venv $(BENCH)
-	$(BENCH)/bin/pip install --quiet --disable-pip-version-check --require-hashes \
+	$(call made,$(BENCH))
+	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes \
 		-r benchmarks/requirements.txt
-	$(BENCH)/bin/pip install --quiet --disable-pip-version-check --no-deps \
+	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
 		--no-build-isolation -e .
 	@touch $@
 

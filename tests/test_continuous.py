@@ -402,7 +402,7 @@ BAD = [
     ({"u": lambda t: np.ones(2, complex)}, ValueError, "u must return shape"),
     ({"rtol": 0.0}, ValueError, "rtol must be in"),
     ({"rtol": np.nan}, ValueError, "rtol must be in"),
-    ({"atol": -1.0}, ValueError, "atol positive"),
+    ({"atol": -1.0}, ValueError, "atol must be a finite positive"),
     ({"method": "Euler"}, ValueError, "method"),
     ({"system": replace(LINEAR, R=np.zeros((3, 3)))}, ValueError, "M R M.*system.M and system.R"),
     ({"system": replace(LINEAR, R=np.eye(2))}, ValueError, "system.h must return"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters.derivatives import check_model, complex_step, jacobian, probe
+from navfilters.derivatives import check_model, complex_step, jacobian
 
 jax.config.update("jax_enable_x64", True)
 
@@ -121,26 +121,6 @@ def test_in_any_argument(position):
 def test_a_given_jacobian_is_used():
     given = object()
     assert jacobian(np.sin, 0, given, name="f") is given
-
-
-def test_probe_returns_the_value():
-    assert_array_equal(probe("f", lambda x: 2 * x, (np.ones(2),), (2,)), [2.0, 2.0])
-
-
-@pytest.mark.parametrize(
-    ("f", "message"),
-    [
-        (lambda x: x[:1], r"f must return shape \(\.\.\., 2\) from shapes \(2,\); found \(1,\)"),
-        (lambda x: x[0], r"f must return shape .*; found \(\)"),
-        (lambda x: x[5], r"f must return shape .*; found IndexError"),
-        (lambda x: x @ np.ones(3), r"f must return shape .*; found ValueError"),
-        (lambda x: x * np.nan, "the value of f must be .* finite"),
-        (lambda x: x + 1j, "the value of f must be .* real"),
-    ],
-)
-def test_probe_refuses(f, message):
-    with pytest.raises(ValueError, match=message):
-        probe("f", f, (np.ones(2),), (2,))
 
 
 class Model:

@@ -446,8 +446,8 @@ REFUSED = {
     ),
     "batch: prior against H": (
         {"prior": PRIORS, "model": Linear(np.ones((2, 2, 2)), np.eye(2))},
-        r"prior.mean \(3,\).*model.jacobian \(2,\)",
-        "jacobian",
+        r"prior.mean \(3,\).*model.R \(2,\)",
+        "model.R",
         "must broadcast",
     ),
 }

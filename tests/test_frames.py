@@ -180,5 +180,5 @@ def test_geodetic_batches():
 
 def test_without_pymap3d_it_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pymap3d", None)
-    with pytest.raises(ImportError, match=r"need pymap3d: pip install navfilters\[sar\]"):
+    with pytest.raises(ImportError, match=r"needs pymap3d: pip install navfilters\[sar\]"):
         geodetic_to_ecef(0.0, 0.0)

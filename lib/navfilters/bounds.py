@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from navfilters import validation
 from navfilters.types import Array
 
 
@@ -161,7 +162,7 @@ def lemma_bound(
     ----------
     xiong2009, Lemma 1, Eqs. (10)-(12).
     """
-    t = np.asarray(t)
+    t = validation.real_array("t", t, "")
     q = 1.0 - lam
     terms = np.where(t > 0, t, 0.0) if lam == 0 else (1 - q**t) / lam
     if as_printed:
@@ -170,7 +171,7 @@ def lemma_bound(
 
 
 class Assumptions(NamedTuple):
-    """The constants of assumptions 1 and 2 of Theorem 1, and what their proof needs besides.
+    """The constants of assumptions 1 and 2 of Theorem 1.
 
     Parameters
     ----------
@@ -181,8 +182,6 @@ class Assumptions(NamedTuple):
         rank H = n.
     p_min, p_max, r_min, r_max, q_max : float
         Bounds of the eigenvalues of P, R and Q.
-    sigma_max : float
-        Largest eigenvalue of Sigma_{t|t-1}, which the printed theorem leaves unbounded.
 
     References
     ----------
@@ -202,17 +201,14 @@ class Assumptions(NamedTuple):
     r_min: float
     r_max: float
     q_max: float
-    sigma_max: float
 
 
-def assumptions(
-    F: Array, beta: Array, H: Array, P: Array, R: Array, Q: Array, Sigma: Array
-) -> Assumptions:
+def assumptions(F: Array, beta: Array, H: Array, P: Array, R: Array, Q: Array) -> Assumptions:
     """The tightest constants of Theorem 1 for a run.
 
     Parameters
     ----------
-    F, beta, P, Q, Sigma : array (..., n, n)
+    F, beta, P, Q : array (..., n, n)
         Of every step; P from t = 0 on.
     H : array (..., m, n)
     R : array (..., m, m)
@@ -224,12 +220,12 @@ def assumptions(
     Notes
     -----
     (17) prints h_min^2 I <= H H^T; (A.14) uses it as h_min^2 I <= H^T H. The two agree when H is
-    square. With fewer measurements than states the second has h_min = 0, and Theorem 1 says
-    nothing.
+    square. With fewer measurements than states the second has h_min = 0, and (A.14) says nothing;
+    V then contracts by what Q adds: see ``contraction``.
     """
     m, n = H.shape[-2:]
     f, b, h = (np.linalg.svd(A, compute_uv=False) for A in (F, beta, H))
-    p, r, q, sigma = (np.linalg.eigvalsh(A) for A in (P, R, Q, Sigma))
+    p, r, q = (np.linalg.eigvalsh(A) for A in (P, R, Q))
     return Assumptions(
         n=n,
         m=m,
@@ -244,38 +240,66 @@ def assumptions(
         r_min=float(r.min()),
         r_max=float(r.max()),
         q_max=float(q.max()),
-        sigma_max=float(sigma.max()),
     )
 
 
-def theorem_constants(a: Assumptions, *, as_printed: bool = False) -> tuple[float, float]:
+def contraction(M: Array, P: Array, P_next: Array) -> Array:
+    """The share of V = e^T P^-1 e that a step takes from every error: the least over directions.
+
+    1 - max over e of (M e)^T P_next^-1 (M e) / e^T P^-1 e
+
+    Parameters
+    ----------
+    M : array (..., n, n)
+        What a step makes of an error: (I - K H) beta F.
+    P, P_next : array (..., n, n)
+        Covariance of the estimate before and after the step, symmetric positive definite.
+
+    Returns
+    -------
+    array (...)
+        The best lambda of Eq. (A.15) at this step.
+
+    References
+    ----------
+    xiong2009, Eqs. (A.1)-(A.5).
+    """
+    root = np.linalg.solve(np.linalg.cholesky(P_next), M @ np.linalg.cholesky(P))
+    return 1 - np.linalg.svd(root, compute_uv=False)[..., 0] ** 2
+
+
+def theorem_constants(a: Assumptions) -> tuple[float, float]:
     """lambda_min and mu_max of Theorem 1, in E[V_t] <= (1 - lambda_min) V_{t-1} + mu_max.
 
-    lambda_min = p_min (h_min beta_min f_min)^2 / (h_max^2 sigma_max + r_max),
+    lambda_min = p_min (h_min beta_min f_min)^2 / (p_max (h_max beta_max f_max)^2
+                 + q_max h_max^2 + r_max),
     mu_max = (1 / p_min + h_max^4 p_max / r_min^2) q_max n + h_max^2 p_max m / r_min
 
     Parameters
     ----------
     a : Assumptions
-    as_printed : bool
-        The lambda_min of (A.14): it bounds Sigma from above by the bound of Sigma_bar, while (19)
-        says that Sigma is the larger of the two. It can be too large.
 
     Returns
     -------
     tuple of float
         (lambda_min, mu_max).
 
+    Notes
+    -----
+    The proof reaches lambda_min through the lambda_t of (A.11), which may be smaller. The rate
+    holds all the same. With the Sigma of the step, (I - K H)^T P^-1 (I - K H) =
+    (Sigma + Sigma H^T R^-1 H Sigma)^-1 <= Sigma^-1 / (1 + s), where
+    s = h_min^2 p_min (beta_min f_min)^2 / r_max because Sigma > beta F P F^T beta, Eq. (19). So V
+    contracts by s / (1 + s), which is never below lambda_min.
+
     References
     ----------
-    xiong2009, Eqs. (A.12), (A.14).
+    xiong2009, Eqs. (A.12), (A.14), (A.15).
     """
-    sigma = a.sigma_max
-    if as_printed:
-        sigma = a.p_max * (a.beta_max * a.f_max) ** 2 + a.q_max
-    lam = a.p_min * (a.h_min * a.beta_min * a.f_min) ** 2 / (a.h_max**2 * sigma + a.r_max)
+    least = a.p_min * (a.h_min * a.beta_min * a.f_min) ** 2
+    most = a.p_max * (a.h_max * a.beta_max * a.f_max) ** 2 + a.q_max * a.h_max**2
     mu = (1 / a.p_min + a.h_max**4 * a.p_max / a.r_min**2) * a.q_max * a.n
-    return lam, mu + a.h_max**2 * a.p_max / a.r_min * a.m
+    return least / (most + a.r_max), mu + a.h_max**2 * a.p_max / a.r_min * a.m
 
 
 def theorem_bound(
@@ -295,8 +319,7 @@ def theorem_bound(
         Times, at least 0.
     as_printed : bool
         With the slips: (20) has mu_max / p_min where (A.2) and Lemma 1 give mu_max p_max (the
-        printed one is not even a square of the state's units), starts its sum at i = 1, and takes
-        lambda_min from (A.14).
+        printed one is not even a square of the state's units), and starts its sum at i = 1.
 
     Returns
     -------
@@ -307,7 +330,7 @@ def theorem_bound(
     ----------
     xiong2009, Theorem 1, Eq. (20); Theorem 2, Eq. (30).
     """
-    lam, mu = theorem_constants(a, as_printed=as_printed)
+    lam, mu = theorem_constants(a)
     if as_printed:
         mu /= a.p_min * a.p_max
     return lemma_bound(1 / a.p_max, 1 / a.p_min, mu, lam, start, t, as_printed=as_printed)

@@ -35,7 +35,9 @@ def nees(error: Any, cov: Any) -> np.ndarray:
     e^T P^-1 e = w^T w with L w = e, by the Cholesky factor of P scaled to a unit diagonal, since
     metres stand beside microradians.
     """
-    error, cov = np.asarray(error, float), np.asarray(cov, float)
+    error = validation.real_array("error", error, "n", finite=False)
+    cov = validation.real_array("cov", cov, "n, n", finite=False)
+    validation.core("cov", cov, error.shape[-1:] * 2)
     variance = np.diagonal(cov, axis1=-2, axis2=-1)
     scale = 1 / np.sqrt(np.where(variance > 0, variance, np.nan))
     L = cholesky(scale[..., :, None] * cov * scale[..., None, :])
@@ -87,10 +89,11 @@ def chi_square_band(dof: int, runs: Any = 1, confidence: float = 0.95) -> tuple[
         A confidence that is not between 0 and 1, or fewer than one run or degree of freedom.
     """
     tail = _tail(confidence)
-    if dof < 1 or np.any(np.asarray(runs) < 1):
+    one, many = validation.number("dof", dof), validation.real_array("runs", runs, "")
+    if one < 1 or np.any(many < 1):
         raise ValueError(f"dof and runs must be at least 1; found {dof} and {np.min(runs)}")
-    total = dof * np.asarray(runs)
-    return tuple(stats.chi2.ppf(p, total) / np.asarray(runs) for p in (tail, 1 - tail))
+    total = one * many
+    return tuple(stats.chi2.ppf(p, total) / many for p in (tail, 1 - tail))
 
 
 class MeanNees(NamedTuple):
@@ -246,7 +249,8 @@ def coverage(error: Any, cov: Any, k: float = 3.0, confidence: float = 0.95) -> 
         not fit.
     """
     tail = _tail(confidence)
-    if not k > 0:
+    k = validation.number("k", k)
+    if k <= 0:
         raise ValueError(f"k must be a positive number of deviations; found {k}")
     error, cov = _runs(error, cov)
     used = np.isfinite(error).all(-1) & np.isfinite(cov).all((-2, -1))
@@ -261,6 +265,7 @@ def coverage(error: Any, cov: Any, k: float = 3.0, confidence: float = 0.95) -> 
 
 
 def _tail(confidence: float) -> float:
+    confidence = validation.number("confidence", confidence)
     if not 0 < confidence < 1:
         raise ValueError(f"confidence must be between 0 and 1; found {confidence}")
     return (1 - confidence) / 2
@@ -268,7 +273,8 @@ def _tail(confidence: float) -> float:
 
 def _runs(error: Any, cov: Any) -> tuple[np.ndarray, np.ndarray]:
     """Errors and covariances with the same leading axes, of which there is at least one."""
-    error, cov = np.asarray(error, float), np.asarray(cov, float)
+    error = validation.real_array("error", error, "", finite=False)
+    cov = validation.real_array("cov", cov, "", finite=False)
     n = error.shape[-1] if error.ndim else 0
     if error.ndim < 2 or cov.shape[-2:] != (n, n):
         raise ValueError(

@@ -13,7 +13,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from navfilters import validation
-from navfilters.derivatives import check_model, jacobian, probe
+from navfilters.derivatives import check_model, jacobian
+from navfilters.probing import probe
 from navfilters.types import Array, Gaussian
 
 Signal = Callable[[float], Array]
@@ -190,13 +191,16 @@ def linearized_kalman_bucy(
     ----------
     lecture16, Eqs. (5)-(30).
     """
-    t, prior, y, y0 = _door(system, prior, y, t, rtol, atol)
+    t, prior, y, y0 = _door(system, prior, y, t)
+    rtol, atol = _tolerances(rtol, atol)
+    if not (np.ndim(residual_tol) == 0 and residual_tol == np.inf):
+        validation.number("residual_tol", residual_tol, least=0, needed="a number of at least 0")
     x_ref, u_ref, w_ref, v_ref = _signals(system, reference, t[0], prior.mean.size)
     u = u_ref if u is None else _signal("u", u, t[0], u_ref(t[0]).size)
     _probe(system, x_ref(t[0]), u(t[0]), w_ref(t[0]), v_ref(t[0]), t[0], y0.size)
     at = x_ref(t[0]), u_ref(t[0]), w_ref(t[0]), t[0]
     if at[1].size:
-        probe("system.B", system.jacobian("B"), at, (at[0].size, at[1].size))
+        probe("system.B", system.jacobian("B"), at, (at[0].size, at[1].size), ())
     _check_reference(system, reference, t, residual_tol)
     A, B, L, C, M = (system.jacobian(name) for name in "ABLCM")
 
@@ -262,7 +266,8 @@ def extended_kalman_bucy(
     ----------
     lecture16, Eqs. (31)-(37).
     """
-    t, prior, y, y0 = _door(system, prior, y, t, rtol, atol)
+    t, prior, y, y0 = _door(system, prior, y, t)
+    rtol, atol = _tolerances(rtol, atol)
     u = _signal("u", u, t[0], None)
     no_w, no_v = np.zeros(len(system.Q)), np.zeros(len(system.R))
     _probe(system, prior.mean, u(t[0]), no_w, no_v, t[0], y0.size)
@@ -303,6 +308,7 @@ def reference_residual(
     ----------
     lecture16, Eq. (6).
     """
+    t = _times(t)
     x, u, w, _ = _signals(system, reference, t[0], None)
     span = t[-1] - t[0]
     pieces = [
@@ -366,11 +372,11 @@ def _signal(name: str, value: Any, t0: float, size: int | None) -> Signal:
         return lambda s: zeros
     if not callable(value):
         raise TypeError(f"{name} must be a function of time; found {type(value).__name__}")
-    first = np.shape(value(t0))
+    first = np.shape(validation.plain(name, value(t0)))
     wanted = (size,) if size is not None else first if len(first) == 1 else ("m",)
 
     def checked(s):
-        array = np.asarray(value(s))
+        array = np.asarray(validation.plain(name, value(s)))
         if array.shape != wanted or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
             found = array if array.shape == wanted else f"shape {array.shape}"
             size = ", ".join(map(str, wanted))
@@ -383,32 +389,42 @@ def _signal(name: str, value: Any, t0: float, size: int | None) -> Signal:
     return checked
 
 
-def _door(system, prior, y, t, rtol, atol):
-    """What both filters check: t, prior, y and the tolerances; and y at the first time."""
+def _tolerances(rtol: Any, atol: Any) -> tuple[float, float]:
+    relative = validation.number("rtol", rtol, least=1e-13, needed="in [1e-13, 1)")
+    if relative >= 1:
+        raise ValueError(f"rtol must be in [1e-13, 1); found {rtol!r}")
+    return relative, validation.number("atol", atol, above=0, needed="a finite positive number")
+
+
+def _door(system, prior, y, t):
+    """What both filters check: t, prior and y; and y at the first time."""
     if not isinstance(system, ContinuousSystem):
         raise TypeError(f"system must be a ContinuousSystem; found {type(system).__name__}")
-    t = validation.real_array("t", t, "k")
-    if t.ndim != 1 or t.size < 2 or (np.diff(t) <= 0).any():
-        raise ValueError(f"t must be at least two increasing times; found shape {t.shape}, {t}")
+    t = _times(t)
     prior = validation.gaussian("prior", prior)
     if prior.mean.ndim != 1 or prior.cov.ndim != 2:
         found = f"{prior.mean.shape} and {prior.cov.shape}"
         raise ValueError(f"prior must have shapes (n,) and (n, n), no batch axes; found {found}")
-    if not (1e-13 <= rtol < 1 and atol > 0):
-        raise ValueError(f"rtol must be in [1e-13, 1) and atol positive; found {rtol}, {atol}")
     y = _signal("y", y, t[0], None)
     return t, prior, y, y(t[0])
+
+
+def _times(t: Any) -> np.ndarray:
+    t = validation.real_array("t", t, "k")
+    if t.ndim != 1 or t.size < 2 or (np.diff(t) <= 0).any():
+        raise ValueError(f"t must be at least two increasing times; found shape {t.shape}, {t}")
+    return t
 
 
 def _probe(system, x, u, w, v, t, p) -> None:
     """Every function of the system, called once, and R~ = M R M^T."""
     n, at, sensing = x.size, (x, u, w, t), (x, v, t)
-    probe("system.f", system.f, at, (n,))
-    probe("system.A", system.jacobian("A"), at, (n, n))
-    probe("system.L", system.jacobian("L"), at, (n, w.size))
-    probe("system.h", system.h, sensing, (p,))
-    probe("system.C", system.jacobian("C"), sensing, (p, n))
-    M = probe("system.M", system.jacobian("M"), sensing, (p, v.size))
+    probe("system.f", system.f, at, (n,), ())
+    probe("system.A", system.jacobian("A"), at, (n, n), ())
+    probe("system.L", system.jacobian("L"), at, (n, w.size), ())
+    probe("system.h", system.h, sensing, (p,), ())
+    probe("system.C", system.jacobian("C"), sensing, (p, n), ())
+    M = probe("system.M", system.jacobian("M"), sensing, (p, v.size), ())
     validation.covariance("M R M^T, from system.M and system.R,", M @ system.R @ M.T, definite=True)
 
 

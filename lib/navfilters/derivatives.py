@@ -46,7 +46,7 @@ def complex_step(
     sqrt(x @ x) for the norm, and compare a new f once with differences.
     """
     name = name or getattr(f, "__qualname__", repr(f))
-    x = np.asarray(x)
+    x = np.asarray(validation.plain("x", x))
     if x.dtype.kind not in "iuf" or x.ndim == 0:
         raise ValueError(f"x must be a real array (..., n); found {x.dtype}, shape {x.shape}")
     columns = []
@@ -54,7 +54,7 @@ def complex_step(
         z = x.astype(complex)
         z[..., j] += 1j * step
         try:
-            value = np.asarray(f(z))
+            value = np.asarray(validation.plain(f"the value of {name}", f(z)))
         except (TypeError, np.exceptions.ComplexWarning) as error:
             raise TypeError(
                 f"{name} must accept complex numbers for its Jacobian by complex step; found "
@@ -133,39 +133,3 @@ def check_model(model: Any, functions: tuple[str, ...], derivatives: tuple[str, 
         if value.ndim != 2:
             raise ValueError(f"{name} must have shape (n, n); found {value.shape}")
         object.__setattr__(model, name, value)
-
-
-def probe(name: str, function: Callable, arguments: tuple, core: tuple[int, ...]) -> np.ndarray:
-    """Call a model's function once, before anything is computed with it, and look at what it gives.
-
-    Parameters
-    ----------
-    name : str
-        What to call function in an error.
-    function : callable
-    arguments : tuple
-        What to call it with.
-    core : tuple of int
-        The trailing axes that its value must have.
-
-    Returns
-    -------
-    ndarray (..., core)
-
-    Raises
-    ------
-    ValueError
-        The call fails on arguments of these sizes, or its value has another shape or is not finite.
-    TypeError
-        As of :func:`complex_step`.
-    """
-    shapes = ", ".join(str(np.shape(a)) for a in arguments)
-    needed = f"{name} must return shape (..., {', '.join(map(str, core))}) from shapes {shapes}"
-    try:
-        value = function(*arguments)
-    except (ValueError, IndexError, AttributeError) as error:
-        raise ValueError(f"{needed}; found {type(error).__name__}: {error}") from error
-    value = validation.real_array(f"the value of {name}", value, "")
-    if value.shape[value.ndim - len(core) :] != core or value.ndim < len(core):
-        raise ValueError(f"{needed}; found {value.shape}")
-    return value

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from navfilters import validation
-from navfilters.derivatives import check_model, jacobian, probe
+from navfilters.derivatives import check_model, jacobian
 from navfilters.filters import kalman_update
+from navfilters.probing import members
 from navfilters.types import Array, Gaussian, Moments
 
 
@@ -75,10 +76,10 @@ class DiscreteSystem:
         -------
         tuple of array
         """
-        at = x, u, np.zeros(len(self.Q)), k
+        at, n = (x, u, np.zeros(len(self.Q)), k), x.shape[-1]
         F = jacobian(self.f, 0, self.F, name="system.f")
         L = jacobian(self.f, 2, self.L, name="system.f")
-        return F(*at), L(*at)
+        return _fits("system.F", F(*at), (n, n)), _fits("system.L", L(*at), (n, len(self.Q)))
 
     def measurement_jacobians(self, x: Array, k: int) -> tuple[Array, Array]:
         """H (..., p, n) and M (..., p, v) at the state x, with v = 0: Eqs. (85)-(86).
@@ -94,9 +95,10 @@ class DiscreteSystem:
         tuple of array
         """
         at = x, np.zeros(len(self.R)), k
-        H = jacobian(self.h, 0, self.H, name="system.h")
-        M = jacobian(self.h, 1, self.M, name="system.h")
-        return H(*at), M(*at)
+        H = jacobian(self.h, 0, self.H, name="system.h")(*at)
+        M = jacobian(self.h, 1, self.M, name="system.h")(*at)
+        H = _fits("system.H", H, (np.shape(H)[-2] if np.ndim(H) > 1 else 1, x.shape[-1]))
+        return H, _fits("system.M", M, (H.shape[-2], len(self.R)))
 
 
 def predict(system: DiscreteSystem, posterior: Gaussian, u: Array, k: int) -> Gaussian:
@@ -124,9 +126,11 @@ def predict(system: DiscreteSystem, posterior: Gaussian, u: Array, k: int) -> Ga
     lecture16, Eqs. (81)-(84), whose index k is k + 1 here; L_k in (49) is the
     L_{k-1} of (84).
     """
+    posterior, u = _given("posterior", posterior), validation.given("u", u)
     F, L = system.motion_jacobians(posterior.mean, u, k)
     P = F @ posterior.cov @ F.mT + L @ system.Q @ L.mT
-    return Gaussian(system.f(posterior.mean, u, np.zeros(len(system.Q)), k), (P + P.mT) / 2)
+    moved = system.f(posterior.mean, u, np.zeros(len(system.Q)), k)
+    return Gaussian(_fits("system.f", moved, posterior.mean.shape[-1:]), (P + P.mT) / 2)
 
 
 def update(system: DiscreteSystem, prior: Gaussian, y: Array, k: int) -> Gaussian:
@@ -155,10 +159,11 @@ def update(system: DiscreteSystem, prior: Gaussian, y: Array, k: int) -> Gaussia
     lecture16, Eqs. (85)-(91). (66) carries a noise term that its own expectation removes; (68) and
     (87) have the estimate x_hat where they print x.
     """
+    prior, y = _given("prior", prior), validation.given("y", y)
     H, M = system.measurement_jacobians(prior.mean, k)
     P_xz = prior.cov @ H.mT
     S = H @ P_xz + M @ system.R @ M.mT
-    y_hat = system.h(prior.mean, np.zeros(len(system.R)), k)
+    y_hat = _fits("system.h", system.h(prior.mean, np.zeros(len(system.R)), k), y.shape[-1:])
     return kalman_update(prior, y, Moments(y_hat, S, P_xz))
 
 
@@ -211,6 +216,17 @@ def extended_kalman_filter(
     return Gaussian(np.stack([s.mean for s in states]), np.stack([s.cov for s in states]))
 
 
+def _fits(name: str, value: Any, shape: tuple[int, ...]) -> Array:
+    """What a function gave, as an array with these trailing axes."""
+    return validation.core(name, validation.given(name, value), shape)
+
+
+def _given(name: str, value: Gaussian) -> Gaussian:
+    """A Gaussian of arrays that fit together; their values are not looked at."""
+    mean = validation.given(f"{name}.mean", value.mean)
+    return Gaussian(mean, _fits(f"{name}.cov", value.cov, mean.shape[-1:] * 2))
+
+
 def _per_step(name: str, value: Any, axes: str) -> np.ndarray:
     """An array whose first axis is the step."""
     array = validation.real_array(name, value, "")
@@ -235,11 +251,15 @@ def _check(system: DiscreteSystem, prior: Gaussian, y: np.ndarray, u: np.ndarray
         np.broadcast_to(prior.mean, (*batch, n)), np.broadcast_to(prior.cov, (*batch, n, n))
     )
     at = prior.mean, u[0], np.zeros(w), 0
-    probe("system.f", system.f, at, (n,))
-    probe("system.F", jacobian(system.f, 0, system.F, name="system.f"), at, (n, n))
-    probe("system.L", jacobian(system.f, 2, system.L, name="system.f"), at, (n, w))
+    F = jacobian(system.f, 0, system.F, name="system.f")
+    L = jacobian(system.f, 2, system.L, name="system.f")
+    members("system.f", system.f, at, 2, (n,), batch, whole=True)
+    members("system.F", F, at, 2, (n, n), batch, whole=False)
+    members("system.L", L, at, 2, (n, w), batch, whole=False)
     sensing = prior.mean, np.zeros(v), 1
-    probe("system.h", system.h, sensing, (p,))
-    probe("system.H", jacobian(system.h, 0, system.H, name="system.h"), sensing, (p, n))
-    probe("system.M", jacobian(system.h, 1, system.M, name="system.h"), sensing, (p, v))
+    H = jacobian(system.h, 0, system.H, name="system.h")
+    M = jacobian(system.h, 1, system.M, name="system.h")
+    members("system.h", system.h, sensing, 1, (p,), batch, whole=True)
+    members("system.H", H, sensing, 1, (p, n), batch, whole=False)
+    members("system.M", M, sensing, 1, (p, v), batch, whole=False)
     return prior

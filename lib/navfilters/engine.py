@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from navfilters import linalg, validation
+from navfilters import linalg, model_checks, validation
 from navfilters._memory import keep_freed_memory
 from navfilters.types import Array, Gaussian, MeasurementModel
 
@@ -47,7 +47,8 @@ def run(
     Raises
     ------
     ValueError
-        A wrong shape, a value that is not finite, a covariance that is not one; before any update.
+        A wrong shape, a value that is not finite, a covariance that is not one, masked entries, a
+        model's function that mixes the members of a batch; before any update.
     TypeError
         An estimator that cannot be called.
 
@@ -67,9 +68,11 @@ def run(
             "estimator must be callable as estimator(prior, z, model), such as FILTERS['EKF']; "
             f"found {estimator!r}"
         )
-    validation.whole_number("steps", steps, 0)
+    steps = validation.whole_number("steps", steps, 0)
+    z_varies = validation.flag("z_varies", z_varies)
     prior = validation.gaussian("prior", prior)
-    z, batch = validation.measurements(z, prior, model, int(steps), z_varies)
+    z, batch = model_checks.measurements(z, prior, model, steps, z_varies)
+    model_checks.sensor(model, prior.mean)
     keep_freed_memory()
     state, states = prior, [prior]
     with np.errstate(all="ignore"):  # a member that fails is NaN in the result: that is its report
@@ -103,7 +106,7 @@ def first_indefinite(cov: Array) -> np.ndarray:
     ValueError
         Fewer than three axes, or matrices that are not square.
     """
-    cov = np.asarray(cov)
+    cov = np.asarray(validation.plain("cov", cov))
     if cov.ndim < 3 or cov.shape[-1] != cov.shape[-2]:
         raise ValueError(f"cov must have shape (steps + 1, ..., n, n); found {cov.shape}")
     with np.errstate(all="ignore"):

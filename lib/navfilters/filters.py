@@ -15,8 +15,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from navfilters import validation
 from navfilters.linalg import matmul, right_divide, spectral_norm
-from navfilters.moments import linearized, second_order, unscented
+from navfilters.moments import linearized, noise, second_order, unscented
 from navfilters.types import Array, Gaussian, MeasurementModel, Moments
 
 Variant = Callable[..., tuple[Gaussian, Moments]]
@@ -41,6 +42,11 @@ def kalman_update(prior: Gaussian, z: Array, moments: Moments) -> Gaussian:
     Gaussian
         The updated mean and covariance. Not finite where P_zz is singular.
 
+    Raises
+    ------
+    ValueError
+        Trailing axes that do not fit together, or a z whose meaning is more than its numbers.
+
     Notes
     -----
     K P_xz^T is symmetric, but its rounding is not. Early rounding stays in P while P shrinks by ten
@@ -50,8 +56,26 @@ def kalman_update(prior: Gaussian, z: Array, moments: Moments) -> Gaussian:
     ----------
     perea2007, Eqs. (5)-(7).
     """
+    z = validation.given("z", z)
+    n, m = prior.mean.shape[-1], moments.P_zz.shape[-1]
+    if not (
+        prior.cov.shape[-2:] == (n, n)
+        and moments.z_hat.shape[-1:] == z.shape[-1:] == (m,)
+        and moments.P_zz.shape[-2:] == (m, m)
+        and moments.P_xz.shape[-2:] == (n, m)
+    ):  # this names what does not fit
+        validation.core("prior.cov", prior.cov, (n, n))
+        validation.core("the expected measurement, from model.h,", moments.z_hat, (m,))
+        validation.core("z", z, (m,))
+        validation.core("its covariance, from model.R,", moments.P_zz, (m, m))
+        validation.core("P_xz, from model.jacobian or model.h,", moments.P_xz, (n, m))
     K = right_divide(moments.P_xz, moments.P_zz)
-    mean = prior.mean + matmul(K, (z - moments.z_hat)[..., None])[..., 0]
+    try:
+        residual = z - moments.z_hat
+    except (TypeError, ValueError):  # of JAX, of NumPy: this names what does not fit
+        validation.batch(z=z.shape[:-1], prior_and_model=moments.z_hat.shape[:-1])
+        raise
+    mean = prior.mean + matmul(K, residual[..., None])[..., 0]
     reduction = matmul(K, moments.P_xz.mT)
     return Gaussian(mean, prior.cov - (reduction + reduction.mT) / 2)
 
@@ -130,7 +154,7 @@ def bump_predicted(
     ----------
     perea2007, section VI.A.1 (B-UKF).
     """
-    spread = moments.P_zz - model.R
+    spread = moments.P_zz - noise(model)
     return prior, _add_noise(moments, _per_member(spread, bump) * spread)
 
 
@@ -186,10 +210,11 @@ def bump_equivalent(prior: Gaussian, model: MeasurementModel, moments: Moments):
             "B-EKF 3 inverts the measurement function, so model must measure as many components as "
             f"the state has; found {m} measurements of {n} states"
         )
-    J_R = right_divide(model.R, H.mT).mT  # H^-1 R, R being symmetric
+    R = noise(model)
+    J_R = right_divide(R, H.mT).mT  # H^-1 R, R being symmetric
     in_state_space = right_divide(J_R, H.mT)
     R_new = spectral_norm(in_state_space)[..., None, None] * matmul(H, H.mT)
-    return prior, _add_noise(moments, R_new - model.R)
+    return prior, _add_noise(moments, R_new - R)
 
 
 def bump_state(prior: Gaussian, model: MeasurementModel, moments: Moments):
@@ -215,7 +240,7 @@ def bump_state(prior: Gaussian, model: MeasurementModel, moments: Moments):
     xp = H.__array_namespace__()
     size = spectral_norm(prior.cov)[..., None, None]
     P_new = size * xp.eye(H.shape[-1])
-    moments = Moments(moments.z_hat, model.R + size * matmul(H, H.mT), size * H.mT)
+    moments = Moments(moments.z_hat, noise(model) + size * matmul(H, H.mT), size * H.mT)
     return Gaussian(prior.mean, P_new), moments
 
 
@@ -240,13 +265,22 @@ def expect_at_mean(prior: Gaussian, model: MeasurementModel, moments: Moments):
     return prior, moments._replace(z_hat=model.h(prior.mean))
 
 
+def _given(prior: Gaussian) -> Gaussian:
+    mean, cov = prior.mean, prior.cov
+    return Gaussian(validation.given("prior.mean", mean), validation.given("prior.cov", cov))
+
+
 def _add_noise(moments: Moments, extra: Array) -> Moments:
     return moments._replace(P_zz=moments.P_zz + extra)
 
 
 def _per_member(like: Array, value: Array) -> Array:
-    if isinstance(value, int | float | np.ndarray) and not np.all(np.asarray(value) >= 0):
-        raise ValueError(f"bump must be at least 0; found {np.min(value)}")
+    if not (type(value) is float and value >= 0) and not validation.traced(value):
+        value = validation.real_array("bump", value, "", finite=False)
+        if not (value >= 0).all():
+            raise ValueError(f"bump must be at least 0; found {np.min(value)}")
+        if value.ndim:
+            validation.batch(bump=value.shape, prior_and_model=like.shape[:-2])
     return like.__array_namespace__().asarray(value)[..., None, None]
 
 
@@ -309,10 +343,13 @@ class Filter:
         Returns
         -------
         Gaussian
-            The updated state. Shapes and values are not checked here; ``run`` does.
+            The updated state. Of arrays only their kind and their trailing axes are checked here;
+            ``run`` checks their values and the model.
 
         Raises
         ------
+        ValueError
+            Masked entries, units, no numbers, trailing axes that do not fit together.
         TypeError
             An option that this filter does not have.
         """
@@ -320,6 +357,10 @@ class Filter:
         if unknown:
             has = ", ".join(self.options) or "none"
             raise TypeError(f"unknown options {sorted(unknown)}; this filter has {has}")
+        mean, cov = prior.mean, prior.cov
+        plain = type(mean) is type(cov) is np.ndarray and mean.dtype.char == cov.dtype.char == "d"
+        if not plain:
+            prior = _given(prior)
         moments = self.moments(prior, model, **_accepted(self.moments, options))
         changed, moments = self.variant(prior, model, moments, **_accepted(self.variant, options))
         return kalman_update(changed, z, moments)
@@ -347,8 +388,10 @@ class Filter:
             Computed in the information form, (P^-1 + H^T R^-1 H)^-1, by LAPACK: no line of the
             filters takes part.
         """
+        z, R = validation.given("z", z), noise(model)
+        prior = _given(prior)
         H = model.jacobian(prior.mean)
-        P, R = self.limit(prior.cov, H, model.R, **_accepted(self.limit, options))
+        P, R = self.limit(prior.cov, H, R, **_accepted(self.limit, options))
         weight = H.mT @ np.linalg.inv(R)
         cov = np.linalg.inv(np.linalg.inv(P) + weight @ H)
         residual = z - (H @ prior.mean[..., None])[..., 0]

@@ -6,11 +6,12 @@ antenna frame s has its third axis along the boresight. Latitude and longitude a
 degrees; every other angle is in radians. Geodetic coordinates need pymap3d.
 """
 
-import importlib
 from typing import Any
 
 import numpy as np
 
+from navfilters import validation
+from navfilters._extras import needed
 from navfilters.types import Array
 
 SEMI_MAJOR = 6378137.0
@@ -173,8 +174,11 @@ def enu_covariance(deviations: Any, latitude: float, longitude: float) -> np.nda
     ----------
     pogorelsky2020, Eq. (29), whose D is in these axes here.
     """
+    deviations = validation.core(
+        "deviations", validation.real_array("deviations", deviations, "3"), (3,)
+    )
     T = east_north_up(latitude, longitude)
-    D = T.T @ np.diag(np.asarray(deviations, float) ** 2) @ T
+    D = T.T @ np.diag(deviations**2) @ T
     return (D + D.T) / 2
 
 
@@ -202,7 +206,12 @@ def geodetic_to_ecef(latitude: Any, longitude: Any, height: Any = 0.0) -> np.nda
     ----------
     pogorelsky2020, section "Image geolocation".
     """
-    return np.stack(_pymap3d().geodetic2ecef(*np.broadcast_arrays(latitude, longitude, height)), -1)
+    names = ("latitude", "longitude", "height")
+    point = (
+        validation.real_array(name, value, "", finite=False)
+        for name, value in zip(names, (latitude, longitude, height), strict=True)
+    )
+    return np.stack(_pymap3d().geodetic2ecef(*np.broadcast_arrays(*point)), -1)
 
 
 def ecef_to_geodetic(r: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -223,16 +232,12 @@ def ecef_to_geodetic(r: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     ImportError
         Without pymap3d.
     """
-    return _pymap3d().ecef2geodetic(*np.moveaxis(np.asarray(r, float), -1, 0))
+    r = validation.core("r", validation.real_array("r", r, "3", finite=False), (3,))
+    return _pymap3d().ecef2geodetic(*np.moveaxis(r, -1, 0))
 
 
 def _pymap3d() -> Any:
-    try:
-        return importlib.import_module("pymap3d")
-    except ImportError:
-        raise ImportError(
-            "geodetic coordinates need pymap3d: pip install navfilters[sar]"
-        ) from None
+    return needed("pymap3d", "navfilters[sar]", "geodetic arithmetic")
 
 
 def _unit(v: Array) -> Array:

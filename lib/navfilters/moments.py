@@ -36,8 +36,32 @@ def linearized(prior: Gaussian, model: MeasurementModel) -> Moments:
     perea2007, Eqs. (10)-(12).
     """
     H = model.jacobian(prior.mean)
+    R = noise(model)
+    validation.core("model.jacobian", H, (R.shape[-1], prior.mean.shape[-1]))
     P_xz = matmul(prior.cov, H.mT)
-    return Moments(model.h(prior.mean), model.R + matmul(H, P_xz), P_xz)
+    return Moments(model.h(prior.mean), R + matmul(H, P_xz), P_xz)
+
+
+def noise(model: MeasurementModel) -> Array:
+    """A model's R, if it is one: a vector or a number would be added to every row.
+
+    Parameters
+    ----------
+    model : MeasurementModel
+
+    Returns
+    -------
+    array (..., m, m)
+
+    Raises
+    ------
+    ValueError
+        Another shape, no real numbers, masked entries or a unit.
+    """
+    R = validation.given("model.R", model.R)
+    if R.ndim > 1 and R.shape[-1] == R.shape[-2]:
+        return R
+    return validation.core("model.R", R, R.shape[-1:] * 2 or (1, 1))
 
 
 def second_order(prior: Gaussian, model: MeasurementModel) -> Moments:
@@ -91,7 +115,10 @@ def second_order_bias(prior: Gaussian, model: MeasurementModel) -> Array:
     ----------
     perea2007, the definition below Eq. (20).
     """
-    products = model.hessian(prior.mean) * prior.cov[..., None, :, :]
+    n = prior.mean.shape[-1]
+    m = np.shape(model.R)[-1]
+    hessian = validation.core("model.hessian", model.hessian(prior.mean), (m, n, n))
+    products = hessian * prior.cov[..., None, :, :]
     xp = products.__array_namespace__()
     return xp.sum(products, axis=(-2, -1)) / 2
 
@@ -152,8 +179,7 @@ class SigmaPoints:
         """
         xp = np if xp is None else xp
         given = 3.0 - n if self.kappa is None else self.kappa
-        known = isinstance(given, int | float | list | tuple | np.ndarray)  # not so while compiling
-        if known and np.any(n + np.asarray(given) <= 0):
+        if not validation.traced(given) and np.any(n + np.asarray(given) <= 0):
             raise ValueError(
                 f"kappa must be larger than {-n} for a state of size {n}; found {given}"
             )
@@ -189,6 +215,8 @@ def sigma_points(prior: Gaussian, points: SigmaPoints) -> Array:
     xp = prior.cov.__array_namespace__()
     n = prior.mean.shape[-1]
     gamma, *_ = points.weights(n, xp)
+    if gamma.ndim:
+        validation.batch(points=gamma.shape, prior=prior.cov.shape[:-2])
     S = gamma[..., None, None] * ROOTS[points.root](prior.cov)
     batch = xp.broadcast_shapes(S.shape[:-2], prior.mean.shape[:-1])
     columns = xp.moveaxis(xp.broadcast_to(S, (*batch, n, n)), -1, 0)
@@ -223,14 +251,15 @@ def unscented(
     """
     X = sigma_points(prior, points)
     xp = X.__array_namespace__()
-    missing = model.R.ndim - X.ndim  # batch axes that only the model has go behind the points' axis
+    R = noise(model)
+    missing = R.ndim - X.ndim  # batch axes that only the model has go behind the points' axis
     X = xp.reshape(X, (X.shape[0], *(1,) * missing, *X.shape[1:]))
-    Z = model.h(X)
+    Z = validation.core("model.h", model.h(X), R.shape[-1:])
     _, _, W0_c, W_i = points.weights(prior.mean.shape[-1], xp)
     # The weights sum to one. Summing differences keeps the digits that a large negative W0 would
     # cancel.
     z_hat = Z[0] + W_i[..., None] * xp.sum(Z[1:] - Z[0], axis=0)
     dX, dZ = X - prior.mean, Z - z_hat
     W0_c, W_i = W0_c[..., None, None], W_i[..., None, None]
-    P_zz = model.R + W0_c * outer_sum(dZ[:1], dZ[:1]) + W_i * outer_sum(dZ[1:], dZ[1:])
+    P_zz = R + W0_c * outer_sum(dZ[:1], dZ[:1]) + W_i * outer_sum(dZ[1:], dZ[1:])
     return Moments(z_hat, P_zz, W_i * outer_sum(dX[1:], dZ[1:]))

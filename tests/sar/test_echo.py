@@ -95,6 +95,21 @@ def test_window_of_the_paper(flight, hit):
         centred_window(PALSAR, flight, hit, lines=101)
 
 
+@pytest.mark.parametrize("squint", [0.2, -0.2])
+def test_a_beam_that_looks_ahead_meets_a_point_earlier(small, flight, hit, squint):
+    looking = replace(small, squint=squint)
+    window = centred_window(looking, flight, hit, 16, 16)
+    heard = np.abs(point_echo(looking, flight, hit, window)).max(axis=1)
+    assert heard[0] == heard[-1] == 0 < heard.max()  # the window holds the whole beam
+    t = window.first_time + np.arange(window.pulses) / looking.prf
+    middle = np.sum(heard**2 * t) / np.sum(heard**2) - flight.closest(hit)[0]
+    ray, v = hit - flight.position(middle), flight.velocity(middle)
+    ahead = np.rad2deg(np.arcsin(ray @ v / np.linalg.norm(ray) / np.linalg.norm(v)))
+    assert_allclose(ahead, squint, rtol=0.02)
+    with pytest.raises(ValueError, match="squint must be less than 5 deg"):
+        replace(small, squint=-5.0)
+
+
 @pytest.mark.parametrize(
     ("dt", "dR", "height"), [(0.0, 0.0, 0.0), (0.011, 333.3, 260.0), (-0.3, -1100.0, -120.0)]
 )

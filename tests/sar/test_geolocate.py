@@ -197,7 +197,7 @@ def test_matcher_refuses(change, message):
 
 def test_opencv_is_asked_for_by_name(monkeypatch):
     monkeypatch.setitem(sys.modules, "cv2", None)
-    with pytest.raises(ImportError, match="pip install opencv-python-headless"):
+    with pytest.raises(ImportError, match=r"needs OpenCV: pip install navfilters\[sar\]"):
         Matcher().features(np.zeros((9, 9)))
 
 
@@ -205,3 +205,12 @@ def test_located_where_the_table_says(acquired, imaging):
     """The experiment's own path, a little out of focus."""
     match = _locate(acquired, acquired.speed + 10.0, imaging)
     assert np.linalg.norm(match.r_f - acquired.r_f) < 5.0
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_no_features_where_values_are_missing(value):
+    """Cast to 8 bits they would be some grey."""
+    image = np.random.default_rng(1).standard_normal((60, 60))
+    image[3, 4:6] = value
+    with pytest.raises(ValueError, match="values must be finite; found 2 that are not"):
+        Matcher().features(image)

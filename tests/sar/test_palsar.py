@@ -732,6 +732,183 @@ def test_folders_that_hold_no_product(tmp_path):
         palsar.open_product(tmp_path)
 
 
+BESIDE = [
+    # what other programs leave in a product's folder
+    ("IMG-HH-{}.aux.xml", "LED-{}.aux.xml"),
+    ("IMG-HH-{}.raw", "IMG-HH-{}.PRM", "IMG-HH-{}.LED", "IMG-HH-{}.SLC"),
+    ("IMG-HH-{}.ovr", "IMG-HH-{}.md5", "LED-{}.md5", "IMG-HH-{}~", "LED-{}.bak"),
+    ("IMG-HH-{} (1)", "LED-{} (1)", "IMG-HH-{}:Zone.Identifier", "._IMG-HH-{}", "IMG-HH-{}.1"),
+    ("VOL-{}", "TRL-{}", "summary.txt", "workreport", "IMG-HH.hdr", "LED-"),
+]
+
+
+@pytest.mark.parametrize("beside", BESIDE)
+@pytest.mark.parametrize("options", [{}, {"polarisation": "HH"}])
+@pytest.mark.parametrize("copy", [False, True])
+def test_what_other_programs_leave_beside_the_files_hides_nothing(tmp_path, beside, options, copy):
+    """Whether it is text or as good as the files themselves."""
+    product(tmp_path)
+    for name in beside:
+        own = LEADER if name.startswith("LED") else IMAGE
+        marked = name.startswith(("IMG-HH-{}", "LED-{}", "._"))
+        (tmp_path / name.format(NAME)).write_bytes(own if copy and marked else b"<PAMDataset/>")
+    got = palsar.open_product(tmp_path, **options)
+    assert (got.image.name, got.leader.name) == (f"IMG-HH-{NAME}", f"LED-{NAME}")
+
+
+def test_two_scenes_whose_names_begin_alike_are_two(tmp_path):
+    for scene in ("scene1", "scene10", "scene1-b", "scene1_b"):
+        for name, data in ((f"IMG-HH-{scene}", IMAGE), (f"LED-{scene}", LEADER)):
+            (tmp_path / name).write_bytes(data)
+    with pytest.raises(
+        ValueError, match=r"one file IMG-\.\.\.; found .*scene1, .*scene1-b, .*scene10"
+    ):
+        palsar.open_product(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("ALPSRP230940670.raw", "none, but GMTSAR"),
+        ("ALPSRP230940670-L1.0.zip", "none, but GMTSAR"),
+        ("scene.ZIP", "none, but an archive: unpack it"),
+        ("VOL-X", "none, but a volume directory"),
+        ("ALOS2015976960-140909_FBDR1.5GUA.kml", "none, but files of PALSAR-2"),
+    ],
+)
+def test_a_folder_without_an_image_says_what_it_has(tmp_path, name, words):
+    (tmp_path / name).write_bytes(b"?")
+    with pytest.raises(ValueError, match=f"one file IMG-...; found {words}"):
+        palsar.open_product(tmp_path)
+
+
+KINDS = [
+    (b"PK\3\4" + b"\0" * 900, "a zip archive: unpack it"),
+    (b"\x1f\x8b\x08" + b"\0" * 900, "a gzip archive"),
+    (b"\x89HDF\r\n\x1a\n" + b"\0" * 900, "an HDF5 file"),
+    (b"II*\0" + b"\0" * 900, "a TIFF image, so of a processed level"),
+    (b"<PAMDataset/>", "markup text"),
+    (bytes([0, 0, 0, 1, 192, 192, 18, 18, 0, 0, 1, 104]) + b" " * 1788, "the volume directory"),
+    (bytes([0, 0, 0, 1, 63, 192, 18, 18, 0, 0, 2, 208]) + b" " * 9000, "the trailer"),
+]
+
+
+@pytest.mark.parametrize(("data", "words"), KINDS)
+def test_another_file_under_a_products_name_is_called_what_it_is(tmp_path, data, words):
+    """Codes and lengths of volume directory and trailer as a product of ALOS-2 has them."""
+    needed = "an image file IMG-... or a leader file LED-..."
+    refused(tmp_path, 0, needed, words, image=data)
+    refused(tmp_path, 0, needed, words, leader=data, file="LED")
+
+
+@pytest.mark.parametrize("kind", ["VOL", "TRL"])
+@pytest.mark.parametrize("data", [b"", b"\0" * 800, IMAGE])
+def test_the_command_names_files_that_are_never_read(tmp_path, kind, data):
+    path = tmp_path / f"{kind}-{NAME}"
+    path.write_bytes(data)
+    with pytest.raises(SystemExit) as ended:
+        palsar.main([str(path)])
+    assert f"({kind})" in ended.value.code
+    assert "IMG-... or a leader file LED-..." in ended.value.code
+
+
+@pytest.mark.parametrize(
+    ("platform", "words"),
+    [
+        ("ALOS2", "'ALOS2': a product of PALSAR-2"),
+        ("ALOS-2", "'ALOS-2': a product of PALSAR-2"),
+        ("ALOS4", "'ALOS4': a product of PALSAR-3"),
+        ("ALOSX", "'ALOSX'"),
+        ("ADEOS", "'ADEOS'"),
+        ("", "''"),
+    ],
+)
+def test_another_satellite_is_refused_by_its_name(tmp_path, platform, words):
+    """Before anything of its other records is read, which have another layout there."""
+    leader = leader_bytes(
+        summary=[(396, "A16", platform)], position=[(8, "B4", 4000), (144, "I4", 2015)]
+    )
+    refused(tmp_path, 720 + 396, "must be ALOS; found " + words, leader=leader, file="LED")
+
+
+@pytest.mark.parametrize("level", ["1.1", "1.5", "1.5GUA", "2.0"])
+def test_another_level_is_refused_before_its_other_records_are_read(tmp_path, level):
+    leader = leader_bytes(summary=[(1094, "A16", level)], position=[(8, "B4", 4000)])
+    words = ["1.0, raw signal data", f"found '{level}'"]
+    words += ["focused already"] if level == "1.1" else []
+    words += ["focused and projected already"] if "1.5" in level else []
+    refused(tmp_path, 720 + 1094, *words, leader=leader, file="LED")
+
+
+def test_an_image_of_another_radar_or_level_says_so_by_its_descriptor(tmp_path):
+    """As those of a genuine level-1.5 product of ALOS-2 do."""
+    rows = [(48, "A16", "AL2 SARCIMOP"), (216, "I4", 16)]
+    refused(tmp_path, 48, "'AL2 SARCIMOP': an image of PALSAR-2", image=image_bytes(rows=rows))
+    refused(tmp_path, 216, "16: an image of a processed", image=image_bytes(rows=rows[1:]))
+    for bits in (5, 8, ""):
+        assert opened(tmp_path, image_bytes(rows=[(216, "I4", bits)])).lines == LINES
+
+
+def facilities(*lengths, extra=b""):
+    """A leader with more records of facilities than the one that the descriptor counts first."""
+    data = bytearray(LEADER)
+    for length in lengths:
+        record = bytearray(length)
+        put(
+            record, [(4, "B1", 18), (5, "B1", 200), (6, "B1", 18), (7, "B1", 70), (8, "B4", length)]
+        )
+        data += record
+    return bytes(data) + extra
+
+
+def counted(data, *lengths):
+    data = bytearray(data)
+    for k, length in enumerate(lengths):
+        put(data, [(434 + 14 * k, "I6", 1), (440 + 14 * k, "I8", length)])
+    return bytes(data)
+
+
+def test_a_leader_is_walked_to_its_end(tmp_path):
+    """Genuine ones have a pair of count and length for each kind of facility, or none."""
+    for leader in (facilities(5000, 728), counted(facilities(5000, 728), 5000, 728)):
+        (tmp_path / f"LED-{NAME}").write_bytes(leader)
+        records = _palsar_leader.read_leader(tmp_path / f"LED-{NAME}").records
+        assert [(start, length) for start, _, length in records[-3:]] == [
+            (30900, 3072), (33972, 5000), (38972, 728),
+        ]  # fmt: skip
+        assert opened(tmp_path, leader=leader).lines == LINES
+
+
+@pytest.mark.parametrize("left", [12, 13, 700, 4999])
+def test_a_leader_cut_in_a_record_that_is_not_used(tmp_path, left):
+    leader = facilities(5000)[: 33972 + left]
+    words = (
+        "record 7 (facility related), codes 18 200 18 70,",
+        f"from 12 to the {left} bytes that the file has left; found 5000",
+        f"{5000 - left} bytes are missing, the file is cut",
+    )
+    refused(tmp_path, 33980, *words, leader=leader, file="LED")
+    leader = counted(leader, 5000)
+    refused(tmp_path, 33980, "record 7 of 7 (facility", leader=leader, file="LED")
+
+
+@pytest.mark.parametrize("size", [33972, 38972])
+def test_a_leader_cut_between_records_that_are_not_used(tmp_path, size):
+    leader = counted(facilities(5000, 728), 5000, 728)[:size]
+    number = 7 if size == 33972 else 8
+    refused(
+        tmp_path, size, f"record {number} of 8 must be there; found the end of the file",
+        leader=leader, file="LED",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("extra", [b"\0" * 5, b"\0" * 4096, b" " * 100, b"end of file\n" * 9])
+def test_what_follows_the_last_record_is_told(tmp_path, extra):
+    found = rf"LED-{NAME}, byte 33972: {len(extra)} bytes after the last of 6 records"
+    with pytest.warns(UserWarning, match=found):
+        assert opened(tmp_path, leader=LEADER + extra).lines == LINES
+
+
 def test_errors_of_the_system_stay_its_own(tmp_path, monkeypatch):
     with pytest.raises(FileNotFoundError):
         palsar.open_product(tmp_path / "nowhere")

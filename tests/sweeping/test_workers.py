@@ -220,7 +220,7 @@ def test_without_joblib_and_tqdm_it_runs_on_one_core(monkeypatch):
     for name in ("joblib", "tqdm"):
         monkeypatch.setitem(sys.modules, name, None)
     assert_same(quiet(EKF, priors(), chunk=7, progress=True).final, wanted)
-    with pytest.raises(ImportError, match=r"workers need joblib: pip install navfilters\[sweep\]"):
+    with pytest.raises(ImportError, match=r"workers needs joblib: pip install navfilters\[sweep\]"):
         quiet(EKF, priors(), workers=2)
 
 

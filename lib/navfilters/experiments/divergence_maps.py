@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from navfilters._extras import command, needed
 from navfilters.experiments.perea2007 import Setup, isotropic, position_error
 from navfilters.filters import FILTERS
 from navfilters.models import RangeBearing
@@ -206,6 +207,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         parser.error(
             f"--size must be at least 2 and --steps at least 1; found {chosen.size}, {chosen.steps}"
         )
+    needed("matplotlib", "navfilters[book]", "a picture of the maps")  # not only after all the work
     options = {"steps": chosen.steps, "engine": chosen.engine, "workers": None, "progress": True}
     found = {}
     for name in FILTERS:
@@ -266,4 +268,4 @@ def _draw(found: dict[str, Array], size: int, out: str) -> list[str]:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

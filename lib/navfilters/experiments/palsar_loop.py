@@ -25,6 +25,7 @@ import numpy as np
 from navfilters.experiments.palsar_patches import (
     Patch,
     cut_patches,
+    fitted,
     flight_through,
     lines_between,
 )
@@ -192,7 +193,7 @@ def run_filter(
         walk=False,
     )
     errors = setup.sigma_range * noise(runs, len(patches), seed).slant_range
-    images = RealImages(patches, errors, imaging)
+    images = RealImages(patches, errors, fitted(imaging, product))
     flight = true_flight(product, patches, setup)
     result = monte_carlo(
         setup, len(patches), runs, seed, flight=flight, measure=images, progress=progress
@@ -271,6 +272,7 @@ def report(
     seed: int = 0,
     *,
     geoid: float = 0.0,
+    unit: str | None = None,
     imaging: Imaging = FULL,
     progress: Callable[[Iterable], Iterable] = iter,
     **options: Any,
@@ -288,6 +290,8 @@ def report(
         See ``run_filter``.
     geoid : float
         See ``read_terrain``.
+    unit : {"dB", "linear"}, optional
+        Of the reference: see ``read_reference``.
     imaging : Imaging
     progress : callable
         Wraps the iterable of images.
@@ -304,6 +308,8 @@ def report(
         As ``open_product`` and ``cut_patches``.
     """
     setup, product = of_case(case), open_product(folder, **options)
-    patches = cut_patches(product, elevation, reference, setup=setup, imaging=imaging, geoid=geoid)
+    patches = cut_patches(
+        product, elevation, reference, setup=setup, imaging=imaging, geoid=geoid, unit=unit
+    )
     outcome = run_filter(product, patches, setup, runs, seed, imaging=imaging, progress=progress)
     return table(product, patches, outcome)

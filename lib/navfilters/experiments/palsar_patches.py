@@ -6,6 +6,7 @@ pixel and at its zero-Doppler time, on the terrain, to the right of the flight.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -144,6 +145,48 @@ class _Sizes(NamedTuple):
     ranges: int
 
 
+def fitted(imaging: Imaging, product: Product) -> Imaging:
+    """Images of the same ground and resolution cell, whatever the product's sampling rate.
+
+    Parameters
+    ----------
+    imaging : Imaging
+        For its radar's sampling rate.
+    product : Product
+
+    Returns
+    -------
+    Imaging
+        The same for that rate. At 16 MHz (a band of 14 MHz, as in FBD) a sample is twice as long as
+        at 32 MHz: half as many samples, and half as many looks in range.
+
+    Raises
+    ------
+    ValueError
+        A rate at which no whole number of looks makes the same cell.
+    """
+    rate = imaging.radar.sampling
+    azimuth, looks = imaging.looks
+    fewer = product.sampling_rate / rate
+    if abs(fewer - 1) < 1e-3:
+        return imaging
+    if round(looks * fewer) < 1 or abs(round(looks * fewer) / (looks * fewer) - 1) > 0.1:
+        raise ValueError(
+            f"product must be sampled such that {looks} looks in range at {1e-6 * rate:g} MHz are "
+            f"a whole number; found {1e-6 * product.sampling_rate:g} MHz in {product.leader}"
+        )
+    return replace(
+        imaging,
+        radar=replace(
+            imaging.radar,
+            sampling=product.sampling_rate,
+            bandwidth=min(imaging.radar.bandwidth, product.sampling_rate),
+        ),
+        looks=(azimuth, round(looks * fewer)),
+        samples=round(imaging.samples * fewer),
+    )
+
+
 def cut_patches(
     product: Product,
     elevation: str | Path,
@@ -152,6 +195,7 @@ def cut_patches(
     setup: Setup = Setup(),
     imaging: Imaging = FULL,
     geoid: float = 0.0,
+    unit: str | None = None,
 ) -> list[Patch]:
     """Up to three patches at the middle of the swath, one interval of the filter apart.
 
@@ -164,9 +208,12 @@ def cut_patches(
     setup : Setup
         Its interval is rounded to whole lines.
     imaging : Imaging
-        How images are formed; what it says of the simulation is not used.
+        How images are formed, at any sampling rate: see ``fitted``. What it says of the simulation
+        is not used.
     geoid : float
         See ``read_terrain``.
+    unit : {"dB", "linear"}, optional
+        Of the reference: see ``read_reference``.
 
     Returns
     -------
@@ -188,10 +235,11 @@ def cut_patches(
     image, 240 Hz for 2048 lines of PALSAR's, the centre keeps its whole aperture and an end of the
     image loses some of its own.
     """
+    imaging = fitted(imaging, product)
     sizes = _sizes(product, setup, imaging)
     starts = first_lines(product.missing, sizes.pulses, lines_between(product, setup))
     return [
-        _cut(product, int(first), sizes, elevation, reference, setup, imaging, geoid)
+        _cut(product, int(first), sizes, elevation, reference, setup, imaging, geoid, unit)
         for first in starts
     ]
 
@@ -244,6 +292,7 @@ def _cut(
     setup: Setup,
     imaging: Imaging,
     geoid: float,
+    unit: str | None,
 ) -> Patch:
     last = first + sizes.pulses
     time = float(product.line_times[first + sizes.pulses // 2])
@@ -261,6 +310,7 @@ def _cut(
         half_width=imaging.half_width,
         pixel=imaging.pixel,
         needed=float(max(across, along)) / 2,
+        unit=unit,
         matcher=imaging.matcher,
     )
     raw = Raw(

@@ -19,6 +19,7 @@ from scipy.interpolate import CubicSpline
 
 import navfilters
 from navfilters import _stored, validation
+from navfilters._extras import command
 from navfilters._progress import bar
 from navfilters.experiments.sar_closed_loop import UPDATES, Images, summary
 from navfilters.experiments.sar_images import (
@@ -370,4 +371,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

@@ -13,6 +13,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from navfilters._extras import command
 from navfilters._progress import progress as progress_bar
 from navfilters.consistency import mean_nees, sample_deviation
 from navfilters.experiments.sar_images import FULL, ImageTable, Imaging, same_images, tabulate
@@ -46,9 +47,9 @@ class Images:
     seed : int
     imaging : Imaging
     geometry : {"nominal", "predicted"}
-        What turns a run's in-track velocity into the effective one: the true position and pixel,
-        as in the paper, where the velocity alone is perturbed; or the run's own position and
-        boresight, whose errors then enter the measured velocity.
+        What turns a run's in-track velocity into the effective one: the true position and pixel, so
+        that the velocity alone is the run's; or the run's own position and boresight, whose errors
+        then enter the measured velocity. The text leaves open which.
     tables : callable
         (setup, k, imaging) -> ImageTable: computed by default, or from a file.
 
@@ -282,4 +283,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

@@ -13,6 +13,7 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 from navfilters import validation
+from navfilters._extras import command
 from navfilters._progress import progress as progress_bar
 from navfilters.attitude import (
     conjugate,
@@ -34,11 +35,6 @@ from navfilters.models.gravity import EARTH, Gravity
 from navfilters.models.sar_geometry import Measurement, SarGeometry
 from navfilters.multiplicative import MekfState, MekfUpdate, mekf_update
 from navfilters.types import Array
-
-
-def _whole(name: str, value: Any, least: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ValueError(f"{name} must be an integer of at least {least}; found {value!r}")
 
 
 @dataclass(frozen=True)
@@ -134,8 +130,8 @@ class Setup:
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise ValueError(f"{name} must be positive; found {getattr(self, name)}")
         for name in ("steps", "shortest"):
-            _whole(name, getattr(self, name), 1)
-        _whole("underweighted", self.underweighted, 0)
+            validation.whole_number(name, getattr(self, name), 1)
+        validation.whole_number("underweighted", self.underweighted, 0)
         for name in NOT_NEGATIVE:
             found, needed = getattr(self, name), (3,) if name == "pixel" else ()
             value = validation.real_array(name, found, "")
@@ -301,7 +297,7 @@ def truth(setup: Setup = CASES["TC-1"], intervals: int = 72) -> Truth:
     ----------
     pogorelsky2020, sections "Closed-loop trajectory" and "Open-loop trajectory".
     """
-    _whole("intervals", intervals, 1)
+    validation.whole_number("intervals", intervals, 1)
     orbit = replace(setup, integrator="rk4").orbit
     flown = max(intervals, setup.shortest)
     x = orbit.path(initial_state(setup), flown * setup.steps)[:: setup.steps]
@@ -527,7 +523,7 @@ def monte_carlo(
     pogorelsky2020, Figs. 8 to 11.
     """
     setup = of_case(case)
-    _whole("updates", updates, 1)
+    validation.whole_number("updates", updates, 1)
     if flight is None:
         flight = truth(setup, max(updates, setup.shortest))
     intervals = len(flight.times) - 1
@@ -678,6 +674,11 @@ def _add_product(parser: argparse.ArgumentParser) -> None:
         "--reference", metavar="FILE", help="GeoTIFF of a geocoded, terrain-corrected SAR image"
     )
     group.add_argument(
+        "--reference-unit",
+        choices=["dB", "linear"],
+        help="of that image, where neither its band nor its pixels tell",
+    )
+    group.add_argument(
         "--geoid",
         metavar="METRES",
         type=float,
@@ -728,7 +729,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     _add_product(parser)
     chosen = parser.parse_args(arguments)
-    options = ("dem", "reference", "geoid", "polarisation", "records", "clock_offset")
+    options = (
+        "dem",
+        "reference",
+        "reference_unit",
+        "geoid",
+        "polarisation",
+        "records",
+        "clock_offset",
+    )
     given = [name for name in options if getattr(chosen, name) is not None]
     if chosen.palsar is None and given:
         parser.error(f"--{given[0].replace('_', '-')} must come with --palsar")
@@ -759,6 +768,7 @@ def _on_product(chosen: argparse.Namespace) -> str:
             chosen.runs,
             chosen.seed,
             geoid=chosen.geoid or 0.0,
+            unit=chosen.reference_unit,
             polarisation=chosen.polarisation,
             records=chosen.records,
             clock_offset=chosen.clock_offset or 0.0,
@@ -769,4 +779,4 @@ def _on_product(chosen: argparse.Namespace) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

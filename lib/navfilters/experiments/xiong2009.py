@@ -12,6 +12,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from navfilters._extras import command
 from navfilters._memory import keep_freed_memory
 from navfilters._progress import progress as progress_bar
 from navfilters.linalg import right_divide
@@ -564,4 +565,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

@@ -88,10 +88,11 @@ class EarthFixedOrbit:
             raise ValueError(
                 f"integrator must be one of ['printed', 'rk4']; found {self.integrator!r}"
             )
-        if not np.isfinite(self.rate):
-            raise ValueError(f"rate must be a finite number of rad/s; found {self.rate}")
-        if not (np.isfinite(self.step) and self.step > 0):
-            raise ValueError(f"step must be a positive number of seconds; found {self.step}")
+        rate = validation.number("rate", self.rate, needed="a finite number of rad/s")
+        seconds = "a positive number of seconds"
+        step = validation.number("step", self.step, above=0, needed=seconds)
+        object.__setattr__(self, "rate", rate)
+        object.__setattr__(self, "step", step)
         Q = np.zeros((6, 6)) if self.Q_psd is None else self.Q_psd
         object.__setattr__(self, "Q_psd", validation.covariance("Q_psd", Q, 6, definite=False))
 

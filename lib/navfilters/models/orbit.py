@@ -34,9 +34,9 @@ class Thrust:
     arcs: tuple[tuple[float, float], ...]
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.magnitude) and self.magnitude >= 0):
-            raise ValueError(f"magnitude must be at least 0; found {self.magnitude}")
-        times = np.array(self.arcs, float).reshape(-1)
+        magnitude = validation.number("magnitude", self.magnitude, least=0, needed="at least 0")
+        object.__setattr__(self, "magnitude", magnitude)
+        times = validation.real_array("arcs", self.arcs, "").reshape(-1)
         if 2 * len(self.arcs) != times.size or not (np.diff(times) >= 0).all():
             raise ValueError(f"arcs must be (start, end) pairs in order of time; found {self.arcs}")
 
@@ -185,11 +185,11 @@ class Orbit:
         if self.integrator not in INTEGRATORS:
             known = sorted(INTEGRATORS)
             raise ValueError(f"integrator must be one of {known}; found {self.integrator!r}")
-        if not (np.isfinite(self.step) and self.step > 0):
-            raise ValueError(f"step must be a positive number of seconds; found {self.step}")
-        substeps = self.substeps
-        if isinstance(substeps, bool) or not isinstance(substeps, int | np.integer) or substeps < 1:
-            raise ValueError(f"substeps must be an integer of at least 1; found {substeps!r}")
+        seconds = "a positive number of seconds"
+        step = validation.number("step", self.step, above=0, needed=seconds)
+        object.__setattr__(self, "step", step)
+        substeps = validation.whole_number("substeps", self.substeps, 1)
+        object.__setattr__(self, "substeps", substeps)
         Q = np.zeros((6, 6)) if self.Q is None else self.Q
         object.__setattr__(self, "Q", validation.covariance("Q", Q, 6, definite=False))
 

@@ -228,7 +228,13 @@ class SarGeometry:
         ----------
         pogorelsky2020, Eqs. (29), (33).
         """
-        r_f = measurement.r_f
+        measurement = Measurement(
+            *(
+                validation.given(f"measurement.{name}", part)
+                for name, part in measurement._asdict().items()
+            )
+        )
+        r_f = validation.core("measurement.r_f", measurement.r_f, (3,))
         xp = r_f.__array_namespace__()
         seen = xp.stack([measurement.slant_range, measurement.speed], axis=-1)
         y = xp.concat([xp.zeros_like(seen), seen], axis=-1)

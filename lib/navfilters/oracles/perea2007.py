@@ -25,7 +25,10 @@ Readings where the text leaves a choice:
 - The scaled weights and the matrix square root of Eq. (21) are arguments: the paper gives neither.
 """
 
-from mpmath import mp, mpf
+try:
+    from mpmath import mp, mpf
+except ImportError:
+    raise ImportError("this oracle needs mpmath: pip install navfilters[book]") from None
 
 __all__ = ["NAMES", "history", "measurement_moments", "position_error", "update"]
 

@@ -14,11 +14,15 @@ to the actual one, whose third axis is the boresight. About 0.35 s for a run of 
 import functools
 
 import numpy as np
-from mpmath import mp
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 from scipy.spatial.transform import Rotation
+
+try:
+    from mpmath import mp
+except ImportError:
+    raise ImportError("this oracle needs mpmath: pip install navfilters[book]") from None
 
 GM, J2 = 3.986004418e14, 1.08262668e-3
 RE, FLAT, OMEGA = 6378137.0, 1 / 298.257223563, 7.292115e-5

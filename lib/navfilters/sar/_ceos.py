@@ -212,13 +212,58 @@ def header(file: FileIO, path: Path, start: int, size: int, name: str) -> tuple[
     ValueError
     """
     first = take(file, path, start, HEADER, name)
-    length = int.from_bytes(first[8:], "big")
+    codes, length = first[4:8], int.from_bytes(first[8:], "big")
     if not HEADER <= length <= size - start:
         swapped = int.from_bytes(first[8:], "little")
-        hint = " (the bytes are in the wrong order)" if HEADER <= swapped <= size - start else ""
+        hint = ""
+        if HEADER <= swapped <= size - start:
+            hint = " (the bytes are in the wrong order)"
+        elif length > size - start:
+            hint = f": {length - size + start} bytes are missing, the file is cut"
         needed = f"from {HEADER} to the {size - start} bytes that the file has left"
-        raise fault(path, start + 8, f"length of the {name}", f"{length}{hint}", needed)
-    return first[4:8], length
+        name = f"length of the {name}, codes {code_text(codes)},"
+        raise fault(path, start + 8, name, f"{length}{hint}", needed)
+    return codes, length
+
+
+_MAGIC = {
+    b"PK\3\4": "a zip archive: unpack it",
+    b"\x1f\x8b": "a gzip archive: unpack it",
+    b"BZh": "a bzip2 archive: unpack it",
+    b"\x89HDF": "an HDF5 file",
+    b"II*\0": "a TIFF image, so of a processed level",
+    b"MM\0*": "a TIFF image, so of a processed level",
+    b"<": "markup text, such as GDAL's .aux.xml",
+}
+_NOT_READ = {
+    "VOL": "the volume directory (VOL), which only lists the product's files",
+    "TRL": "the trailer (TRL), which holds neither echoes nor an orbit",
+}
+
+
+def foreign_kind(path: Path, start: bytes) -> str:
+    """What a file is that a product's reader cannot use, by its first bytes and its name.
+
+    Parameters
+    ----------
+    path : Path
+    start : bytes
+        At least 12 bytes, where there are so many.
+
+    Returns
+    -------
+    str
+        Empty for what may be an image or a leader file.
+    """
+    for magic, kind in _MAGIC.items():
+        if start.startswith(magic):
+            return kind
+    codes, named = start[4:8], path.name.upper().startswith
+    if codes[1:] == b"\xc0\x12\x12" and codes[:1] == b"\xc0":  # 192 192 18 18
+        return _NOT_READ["VOL"]
+    if codes[1:] == b"\xc0\x12\x12" and codes[:1] == b"?":  # 63 192 18 18
+        return _NOT_READ["TRL"]
+    return next((kind for name, kind in _NOT_READ.items() if named(f"{name}-")), "")
 
 
 def descriptor(
@@ -246,9 +291,12 @@ def descriptor(
     ValueError
         A file that is shorter, or another format's.
     """
+    start = file.read(HEADER)
+    if kind := foreign_kind(path, start):
+        found, needed = f"{kind}", "an image file IMG-... or a leader file LED-..."
+        raise fault(path, 0, "file", found, needed)
     if size < 720:
         raise fault(path, size, "file", f"its end at byte {size}", "at least 720 bytes long")
-    start = take(file, path, 0, HEADER, "file descriptor")
     if (length := int.from_bytes(start[8:], "big")) == 16252:
         raise fault(path, 8, "length of the file descriptor", "16252, ERSDAC's layout", "720")
     if length != 720:
@@ -257,7 +305,10 @@ def descriptor(
         raise fault(path, 8, "length of the file descriptor", f"{length}{hint}", "720")
     if start[5:8] != b"\xc0\x12\x12" or first_code not in (None, start[4]):
         needed = f"{'any' if first_code is None else first_code} 192 18 18"
-        raise fault(path, 4, "codes of the file descriptor", code_text(start[4:8]), needed)
+        kind = {11: ", a leader file's", 50: ", an image file's"}.get(start[4], "")
+        hint = kind if start[5:8] == b"\xc0\x12\x12" else ""
+        found = f"{code_text(start[4:8])}{hint}"
+        raise fault(path, 4, "codes of the file descriptor", found, needed)
     return Record(path, 0, take(file, path, 0, 720, "file descriptor"), fields)
 
 

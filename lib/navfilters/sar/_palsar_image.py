@@ -140,6 +140,7 @@ def read_headers(path: Path, records: tuple[int, int] | None = None) -> Headers:
     with open(path, "rb", buffering=0) as file:
         size = path.stat().st_size
         head = descriptor(file, path, size, None, IMAGE)
+        _refuse_processed(head)
         codes, length = header(file, path, 720, size, "first signal record")
         if codes != _CODES:
             hint = ", processed data" if codes[1] == 11 else ""
@@ -168,6 +169,17 @@ def read_headers(path: Path, records: tuple[int, int] | None = None) -> Headers:
     headers.refuse("record length", every, values["record length"] != length, f"{length}")
     headers.within("missing-line flag", every)
     return headers
+
+
+def _refuse_processed(head: Record) -> None:
+    """Raise where the descriptor tells of another radar, or of samples that are no raw bytes."""
+    if (name := head.text("file name")).startswith("AL2"):
+        found = f"{name!r}: an image of PALSAR-2, another radar, which is not read"
+        raise head.error("file name", found, "that of an image of ALOS's PALSAR")
+    bits = head.text("bits a sample")
+    if bits.isdigit() and 8 < int(bits) <= 64:
+        found = f"{bits}: an image of a processed level, such as 1.1 or 1.5"
+        raise head.error("bits a sample", found, "at most 8, as raw data of level 1.0 have")
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,6 +47,9 @@ class Radar:
         Pulses in a second, Hz.
     antenna : float
         Length along the flight, m.
+    squint : float
+        Angle by which the beam looks ahead of the plane across the flight, deg: an antenna that is
+        not where it should be. The pattern in elevation is left out, so no other angle matters.
     nesz : float
         Reflectivity that the thermal noise equals, dB of the scene's unit.
     falling : bool
@@ -75,6 +78,7 @@ class Radar:
     sampling: float = 32e6
     prf: float = 2150.0
     antenna: float = 8.9
+    squint: float = 0.0
     nesz: float = -23.0
     falling: bool = True
     flat_beam: bool = False
@@ -89,6 +93,8 @@ class Radar:
                 f"sampling must be at least the bandwidth, {self.bandwidth} Hz; found "
                 f"{self.sampling}"
             )
+        if not abs(self.squint) < 5:
+            raise ValueError(f"squint must be less than 5 deg either way; found {self.squint}")
         if np.isnan(self.nesz):
             raise ValueError(f"nesz must be a number of dB, or -inf; found {self.nesz}")
 
@@ -113,13 +119,13 @@ class Radar:
         Parameters
         ----------
         sine : array (...)
-            Of the angle from the middle of the beam, along the flight.
+            Of the angle ahead of the plane across the flight.
 
         Returns
         -------
         ndarray (...)
         """
-        u = self.antenna / self.wavelength * np.asarray(sine)
+        u = self.antenna / self.wavelength * (np.asarray(sine) - np.sin(np.deg2rad(self.squint)))
         return np.where(np.abs(u) <= 0.5, 1.0 if self.flat_beam else np.sinc(u) ** 2, 0.0)
 
 
@@ -532,10 +538,10 @@ def _span(
 
 
 def _half_aperture(radar: Radar, flight: Flight, window: Window) -> int:
-    """Pulses for which the beam stays on a point, half of them and a few."""
+    """Pulses from the plane across the flight to the beam's farther edge on a point, and a few."""
     far = window.near_range + window.ranges * radar.range_spacing
     t = window.first_time + window.pulses / (2 * radar.prf)
-    angle = np.arcsin(radar.wavelength / (2 * radar.antenna))
+    angle = np.arcsin(radar.wavelength / (2 * radar.antenna)) + np.deg2rad(abs(radar.squint))
     # the direction to a point turns at V_eff^2 / (|v| R), and V_eff^2 is some 0.9 of |v|^2
     p = flight.ground_point(t, far, 0.0)
     v = flight.velocity(t)
@@ -678,7 +684,8 @@ def centred_window(
     dR = radar.range_spacing
     near = R - samples // 2 * dR
     half = _half_aperture(radar, flight, Window(t, 0, samples, near))
-    migration = R / 8 * (radar.wavelength / radar.antenna) ** 2 * 1.1  # R angle^2 / 2
+    angle = radar.wavelength / (2 * radar.antenna) + np.deg2rad(abs(radar.squint))
+    migration = R * angle**2 / 2 * 1.1  # times (norm(v) / V_eff)^2, of which 2 samples are below
     ranges = samples + radar.chirp_samples + int(np.ceil(migration / dR)) + 2
     pulses = lines + 2 * half
     return Window(t - pulses // 2 / radar.prf, pulses, ranges, near)

@@ -7,13 +7,13 @@ orthoimage, whose pixels stand where the ground is. Each of its pixels knows its
 longitude on the true terrain.
 """
 
-import importlib
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from navfilters import validation
+from navfilters._extras import needed
 from navfilters.frames import geodetic_to_ecef
 from navfilters.sar.focus import GroundImage, decibels
 from navfilters.sar.scene import Scene, View
@@ -103,9 +103,14 @@ class Matcher:
 
         Raises
         ------
+        ValueError
+            A value that is not finite.
         ImportError
             Without OpenCV.
         """
+        if not np.isfinite(values).all():
+            count = int((~np.isfinite(values)).sum())
+            raise ValueError(f"values must be finite; found {count} that are not")
         low, high = np.percentile(values, [1, 99])
         grey = np.clip((values - low) / max(high - low, 1e-9), 0, 1) * 255
         sift = _cv2().SIFT_create(
@@ -467,7 +472,4 @@ def geolocate(image: GroundImage, reference: Reference, *, relief: bool = True) 
 
 
 def _cv2() -> Any:
-    try:
-        return importlib.import_module("cv2")
-    except ImportError:
-        raise ImportError("geolocation needs OpenCV: pip install opencv-python-headless") from None
+    return needed("cv2", "navfilters[sar]", "geolocation")

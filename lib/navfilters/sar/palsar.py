@@ -22,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
+from navfilters._extras import command
 from navfilters.sar._ceos import SPEED_OF_LIGHT, Record, take
 from navfilters.sar._palsar_contents import contents
 from navfilters.sar._palsar_image import PREFIX, Headers, grid, read_headers
@@ -37,6 +38,7 @@ from navfilters.validation import real_array, whole_number
 MIDDLE = 15.5
 """Zero signal, between the codes 15 and 16 of 0 to 31, where the leader gives none."""
 _TOP = 31  # the largest 5-bit code
+_MARKS = ".~:( "  # between a file's name and what another program appends to it
 _BLOCK = 256  # lines that the Doppler estimate holds at once
 
 
@@ -271,13 +273,10 @@ def _files(folder: Path, polarisation: str | None) -> tuple[Path, Path]:
     """The image and the leader file of a folder."""
     wanted = "IMG-" if polarisation is None else f"IMG-{polarisation.upper()}-"
     files = sorted(path for path in folder.iterdir() if path.is_file())
-    images, leaders = (
-        [path for path in files if path.name.upper().startswith(start)]
-        for start in (wanted, "LED-")
-    )
+    images, leaders = (_of_product(files, start) for start in (wanted, "LED-"))
     for found, name, hint in ((images, wanted, ": choose a polarisation"), (leaders, "LED-", "")):
         if len(found) != 1:
-            names = ", ".join(path.name for path in found) or "none"
+            names = ", ".join(path.name for path in found) or _instead(files)
             hint = hint if len(found) > 1 and polarisation is None else ""
             raise ValueError(f"{folder} must hold one file {name}...; found {names}{hint}")
     image, leader = images[0], leaders[0]
@@ -286,6 +285,43 @@ def _files(folder: Path, polarisation: str | None) -> tuple[Path, Path]:
             f"{folder} must hold image and leader of one scene; found {image.name}, {leader.name}"
         )
     return image, leader
+
+
+def _of_product(files: Sequence[Path], start: str) -> list[Path]:
+    """Files whose names begin so, without what other programs have put beside them.
+
+    Such a side file has the name of another one, and more behind a mark: IMG-HH-NAME.aux.xml. Where
+    several are left, those that do not begin as the format's files do are no choice.
+    """
+    found = [path for path in files if path.name.upper().startswith(start)]
+    names = {path.name for path in found}
+    found = [
+        path
+        for path in found
+        if not any(path.name[:k] in names for k, mark in enumerate(path.name) if mark in _MARKS)
+    ]
+    begin = [path for path in found if len(found) > 1 and _begins(path)]
+    return begin or found
+
+
+def _begins(path: Path) -> bool:
+    with open(path, "rb") as file:
+        return file.read(8)[5:] == b"\xc0\x12\x12"
+
+
+def _instead(files: Sequence[Path]) -> str:
+    """None, and what there is that tells why."""
+    names = [path.name for path in files]
+    for start, hint in (
+        ("ALPSR", "GMTSAR's or another program's files: the IMG- and LED- files are needed"),
+        ("ALOS2", "files of PALSAR-2, another radar, which is not read"),
+        ("VOL-", "a volume directory without the files that it lists"),
+    ):
+        if any(name.upper().startswith(start) for name in names):
+            return f"none, but {hint}"
+    if any(name.lower().endswith((".zip", ".gz", ".tgz", ".tar")) for name in names):
+        return "none, but an archive: unpack it"
+    return "none"
 
 
 def _without_echo(headers: Headers, summary: Record) -> np.ndarray:
@@ -358,4 +394,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

@@ -18,6 +18,7 @@ from scipy.ndimage import map_coordinates, spline_filter
 from scipy.optimize import brentq
 
 from navfilters import validation
+from navfilters._extras import needed
 from navfilters.frames import (
     FLATTENING,
     SEMI_MAJOR,
@@ -86,7 +87,7 @@ class LocalMap:
         Parameters
         ----------
         latitude, longitude : array (...)
-            Geodetic, deg.
+            Geodetic, deg; whole turns do not count.
 
         Returns
         -------
@@ -94,7 +95,13 @@ class LocalMap:
             East and north, m.
         """
         to_east, to_north = self.metres
-        return (longitude - self.longitude) * to_east, (latitude - self.latitude) * to_north
+        turned = longitude - _turns(longitude, self.longitude)
+        return (turned - self.longitude) * to_east, (latitude - self.latitude) * to_north
+
+
+def _turns(longitude: Any, near: float) -> Any:
+    """The whole turns, deg, by which longitudes are farther than half a turn from another."""
+    return 360.0 * np.round((np.asarray(longitude) - near) / 360.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +144,7 @@ class Terrain:
         Parameters
         ----------
         latitude, longitude : array (...)
-            Geodetic, deg.
+            Geodetic, deg; whole turns do not count.
 
         Returns
         -------
@@ -146,7 +153,8 @@ class Terrain:
         """
         place = np.broadcast_arrays(latitude, longitude)
         row = (place[0] - self.south) / self.spacing
-        column = (place[1] - self.west) / self.spacing
+        middle = self.west + self.spacing * (self.posts.shape[1] - 1) / 2
+        column = (place[1] - _turns(place[1], middle) - self.west) / self.spacing
         where = np.stack([np.ravel(row), np.ravel(column)])  # no axes are too few for SciPy
         height = map_coordinates(
             self._coefficients, where, order=3, mode="mirror", prefilter=False
@@ -170,13 +178,7 @@ def sample_posts() -> Array:
     ImportError
         Without matplotlib.
     """
-    try:
-        from matplotlib.cbook import get_sample_data
-    except ImportError:
-        raise ImportError(
-            "the sample terrain needs matplotlib: pip install navfilters[book]"
-        ) from None
-    tile: Any = get_sample_data(TILE)
+    tile = needed("matplotlib.cbook", "navfilters[sar]", "the sample terrain").get_sample_data(TILE)
     with tile:
         posts = tile["elevation"][::-1].astype(float)
     posts.setflags(write=False)

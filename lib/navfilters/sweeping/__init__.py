@@ -10,6 +10,7 @@ from contextlib import closing, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
+from uuid import uuid4
 
 import numpy as np
 
@@ -17,8 +18,8 @@ from navfilters import validation
 from navfilters.sweeping import workers as places
 from navfilters.sweeping.checkpoints import Checkpoint
 from navfilters.sweeping.chunks import Chunk, Job, Kept, SweepError, compute
-from navfilters.sweeping.problems import WORTH_A_PROCESS, Problem
-from navfilters.sweeping.trees import flatten, unflatten
+from navfilters.sweeping.problems import WORTH_A_PROCESS, Problem, probe_models
+from navfilters.sweeping.results import Results
 from navfilters.types import Gaussian
 
 __all__ = ["Sweep", "SweepError", "sweep"]
@@ -82,8 +83,9 @@ def sweep(
     z : array (..., m), or (steps, ..., m) with z_varies
         The measurement: the same at every step, or one for each.
     model : MeasurementModel, or (dynamics, sensor) for a filter with a memory
-        It has batch axes if its R, or its Q, has them. Then it is a dataclass, and every array in
-        it is a matrix (..., a, b) unless its field says ``field(metadata={"axes": number})``.
+        It has batch axes if its R, or its Q, has them. Then every array among its fields or
+        attributes is a matrix (..., a, b), unless it is a dataclass whose field says
+        ``field(metadata={"axes": number})``; what is in a closure is shared by all.
     steps : int
         How many steps.
     engine : {"numpy", "jax"}
@@ -95,7 +97,7 @@ def sweep(
     z_varies : bool
         Whether the first axis of z, and of truth, is the step.
     client : distributed.Client, optional
-        Compute on its cluster.
+        Compute on its cluster; wait for its first worker, and say so.
     workers : int, optional
         Without a client: processes of this machine (threads for JAX), which need joblib. By default
         one per core if there is enough to do, and one without joblib.
@@ -115,12 +117,16 @@ def sweep(
     Raises
     ------
     ValueError
-        A wrong shape, a value that is not finite, a covariance that is not one, an unknown name:
-        before any step. A checkpoint file that is damaged or belongs to another sweep.
+        A wrong shape, a value that is not finite, a covariance that is not one, an unknown name,
+        masked entries, a model's function that mixes configurations: before any step. A checkpoint
+        file that is damaged or belongs to another sweep.
     TypeError
         An estimator that is none.
     SweepError
-        The filter or the model raised an exception; names the configuration.
+        The filter or the model raised an exception; names the configuration. Or a chunk whose
+        result is missing, or is not of the shape and type of the first configuration's.
+    TimeoutError
+        A cluster without workers.
     KeyboardInterrupt
         Says how many configurations were finished, and whether they can be used.
 
@@ -161,15 +167,14 @@ def sweep(
     kinds = _keep(keep, truth)
     if engine not in ("numpy", "jax"):
         raise ValueError(f"engine must be 'numpy' or 'jax'; found {engine!r}")
-    for name, value in (("workers", workers), ("chunk", chunk)):
-        if value is not None:
-            validation.whole_number(name, value, 1)
-
+    z_varies = validation.flag("z_varies", z_varies)
+    workers, chunk = (
+        None if value is None else validation.whole_number(name, value, 1)
+        for name, value in (("workers", workers), ("chunk", chunk))
+    )
     problem = Problem.of(estimator, priors, z, model, truth, steps, z_varies)
-    job = Job(engine, problem.tree, problem.axes, problem.grid, steps, kinds, z_varies)
-    # One step of the first configuration: what a chunk's result will look like.
-    probe = replace(job, engine="numpy", steps=min(steps, 1))
-    results = _Results(compute(probe, problem.chunk(0, 1)), problem.count, steps)
+    job = Job(engine, problem.tree, problem.axes, problem.grid, steps, kinds, z_varies, uuid4().hex)
+    results = Results(_probe(job, problem), problem.count, steps)
     size = min(chunk, problem.count) if chunk else problem.size(steps, results.series_bytes)
     if engine == "jax":
         from navfilters.sweeping.compiled import whole_blocks
@@ -179,7 +184,8 @@ def sweep(
     if checkpoint is not None:
         store = Checkpoint(checkpoint, job, problem.leaves, size, results.tree)
     _fill(results, job, problem, size, store, _place(job, problem, client, workers), progress)
-    return results.collect(problem.batch)
+    kept = results.collect(problem.batch)
+    return Sweep(kept.final, kept.indefinite, kept.rows.error, kept.rows.history)
 
 
 def _keep(keep: Collection[str], truth: Any) -> tuple[str, ...]:
@@ -193,6 +199,23 @@ def _keep(keep: Collection[str], truth: Any) -> tuple[str, ...]:
             f"{keep!r}"
         )
     return tuple(name for name in KEEP if name in keep)
+
+
+def _probe(job: Job, problem: Problem) -> Kept:
+    """One step of the first configuration, once its model is known to be sound."""
+    one = replace(job, engine="numpy", steps=min(job.steps, 1))
+    with _doubles(job.engine):
+        probe_models(one, problem)
+        return compute(one, problem.chunk(0, 1))
+
+
+def _doubles(engine: str) -> Any:
+    """Where JAX's arrays are as they will be when it computes."""
+    if engine == "numpy":
+        return nullcontext()
+    import jax
+
+    return jax.enable_x64(True)
 
 
 def _place(job: Job, problem: Problem, client: Any, workers: int | None) -> Callable[..., Iterator]:
@@ -216,52 +239,6 @@ def _default_workers(engine: str, updates: int) -> int:
     from navfilters.sweeping.compiled import on_processor
 
     return cpu_count() if on_processor() else 1
-
-
-class _Results:
-    """What is kept of all members, to be filled in chunk by chunk."""
-
-    def __init__(self, like: Kept, count: int, steps: int) -> None:
-        self.tree, leaves = flatten("kept", like, None)
-        self.axes = [int(leaf.name.startswith("kept.rows")) for leaf in leaves]
-        single = [leaf.array.shape[i] == 1 for leaf, i in zip(leaves, self.axes, strict=True)]
-        if not (all(single) and self.tree.only_arrays):
-            found = {leaf.name.removeprefix("kept."): leaf.array.shape for leaf in leaves}
-            raise ValueError(
-                "estimator must return arrays whose first axis is that of the configurations; "
-                f"found {found or 'none'} for one configuration"
-            )
-        self.arrays = [
-            np.empty((*(steps + 1,) * i, count, *leaf.array.shape[i + 1 :]), leaf.array.dtype)
-            for leaf, i in zip(leaves, self.axes, strict=True)
-        ]
-        self.count, self.finished = count, 0
-
-    @property
-    def series_bytes(self) -> int:
-        """Size of the rows that are kept, per member."""
-        rows = [a.nbytes for a, i in zip(self.arrays, self.axes, strict=True) if i]
-        return sum(rows) // self.count
-
-    def put(self, chunk: Chunk, kept: Kept) -> int:
-        """Fill in a chunk; how many members that are."""
-        _, leaves = flatten("kept", kept, None)
-        first = int(chunk.members[0])
-        members = int(chunk.members[-1]) + 1 - first
-        for array, leaf, i in zip(self.arrays, leaves, self.axes, strict=True):
-            lead = (slice(None),) * i
-            array[(*lead, slice(first, first + members))] = leaf.array[(*lead, slice(members))]
-        self.finished += members
-        return members
-
-    def collect(self, batch: tuple[int, ...]) -> Sweep:
-        """The result, with the batch axes of the sweep."""
-        shaped = [
-            a.reshape((*a.shape[:i], *batch, *a.shape[i + 1 :]))
-            for a, i in zip(self.arrays, self.axes, strict=True)
-        ]
-        kept = unflatten(self.tree, shaped)
-        return Sweep(kept.final, kept.indefinite, kept.rows.error, kept.rows.history)
 
 
 def _numbered(job: Job, chunk: Chunk) -> tuple[int, Kept]:
@@ -291,6 +268,7 @@ def _fill(results, job, problem, size, store, place, progress) -> None:
     """Load the chunks that are stored and compute the others."""
     with _bar(problem.count, progress) as bar:
         missing = []
+        results.missing = set(range(-(-problem.count // size)))
         for number in range(-(-problem.count // size)):
             kept = store.load(number) if store else None
             if kept is None:

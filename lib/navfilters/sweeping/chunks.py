@@ -35,6 +35,8 @@ class Job:
         Names of what is kept.
     z_varies : bool
         Whether z and truth are series over the steps.
+    sweep : str
+        Another one for every sweep.
     """
 
     engine: str
@@ -44,6 +46,7 @@ class Job:
     steps: int
     keep: tuple[str, ...]
     z_varies: bool
+    sweep: str = ""
 
 
 class Chunk(NamedTuple):

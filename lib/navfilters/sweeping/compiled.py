@@ -4,11 +4,17 @@ import threading
 from functools import lru_cache
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
+from navfilters._extras import missing
 from navfilters.sweeping.chunks import Job, Kept, March, Row
+from navfilters.sweeping.trees import Tree
+
+try:
+    import jax
+    import jax.numpy as jnp
+except ImportError as error:
+    raise missing("jax", "navfilters[jax]", 'engine="jax"', error) from None
 
 BLOCK = 512
 """Members that a processor's core takes through all steps at once: their arrays stay in its cache,
@@ -43,15 +49,38 @@ def by_jax(job: Job, arrays: list[np.ndarray]) -> Kept:
     """
     with jax.enable_x64(True):
         with _compiling:  # two threads would both compile
-            key = (job.tree, job.axes, job.steps, job.keep, job.z_varies)
+            tree = job.tree if job.tree.constant else _Once(job.tree, job.sweep)
+            key = (tree, job.axes, job.steps, job.keep, job.z_varies)
             run = _program(key, tuple((a.shape, a.dtype) for a in arrays))
         return jax.tree.map(np.asarray, run(arrays))
+
+
+class _Once:
+    """A tree with something in it that may change between two sweeps without being another.
+
+    Parameters
+    ----------
+    tree : Tree
+    sweep : str
+        What it is compiled for.
+    """
+
+    def __init__(self, tree: Tree, sweep: str) -> None:
+        self.tree, self.sweep = tree, sweep
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Once) and self.sweep == other.sweep
+
+    def __hash__(self) -> int:
+        return hash(self.sweep)
 
 
 @lru_cache(maxsize=64)
 def _program(key: tuple, shapes: tuple) -> Any:
     """The executable of a job for arrays of these shapes."""
     tree, axes, steps, keep, z_varies = key
+    if isinstance(tree, _Once):
+        tree = tree.tree
     job = Job("jax", tree, axes, (), steps, keep, z_varies)
     arguments = [jax.ShapeDtypeStruct(*shape) for shape in shapes]
     return jax.jit(lambda arrays: _in_blocks(job, arrays)).lower(arguments).compile()

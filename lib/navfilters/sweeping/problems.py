@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from navfilters import validation
-from navfilters.sweeping.chunks import Chunk
+from navfilters import model_checks, validation
+from navfilters.sweeping.chunks import Chunk, Job, March
 from navfilters.sweeping.trees import Leaf, Tree, flatten
 from navfilters.types import Gaussian
 
@@ -19,6 +19,9 @@ PARTS = 8
 
 WORTH_A_PROCESS = 1e7
 """Updates below which a second process costs more time to start than it saves."""
+
+SEVERAL = 3
+"""Configurations that stand for a batch when the model's functions are looked at."""
 
 SENT = 2**26
 """Bytes of the series over the steps, given and kept, of a chunk."""
@@ -46,8 +49,12 @@ class Problem:
     def of(cls, estimator, priors, z, model, truth, steps, z_varies) -> "Problem":
         """The arguments of a sweep, checked; ValueError names the one that is wrong."""
         priors = validation.gaussian("priors", priors)
-        sensor = model[-1] if isinstance(model, tuple) else model
-        z, _ = validation.measurements(z, priors, sensor, steps, z_varies, "priors")
+        remembers = hasattr(estimator, "step")
+        sensor = model[1] if remembers else model
+        z, _ = model_checks.measurements(z, priors, sensor, steps, z_varies, "priors")
+        if remembers and hasattr(model[0], "transition"):
+            n = priors.mean.shape[-1]
+            validation.covariance("model[0].Q", getattr(model[0], "Q", None), n, definite=False)
         if truth is not None:
             truth = _truth(truth, priors, steps, z_varies)
         parts = {
@@ -55,7 +62,7 @@ class Problem:
             "mean": flatten("priors.mean", priors.mean, 1),
             "cov": flatten("priors.cov", priors.cov, 2),
             "z": flatten("z", z, 1, int(z_varies)),
-            "model": _model(model),
+            "model": _pair(model) if remembers else _one_model("model", model),
             "truth": flatten("truth", truth, 1, int(z_varies)),
         }
         leaves = [leaf for _, more in parts.values() for leaf in more]
@@ -128,10 +135,8 @@ def _truth(truth: Any, priors: Gaussian, steps: int, z_varies: bool) -> np.ndarr
     return truth
 
 
-def _model(model: Any) -> tuple[Tree, list[Leaf]]:
-    """A model, or a pair of them, taken apart."""
-    if not isinstance(model, tuple):
-        return _one_model("model", model)
+def _pair(model: tuple) -> tuple[Tree, list[Leaf]]:
+    """A pair of models taken apart."""
     parts = [_one_model(f"model[{i}]", part) for i, part in enumerate(model)]
     names = tuple(str(i) for i in range(len(model)))
     return Tree(tuple, names, tuple(t for t, _ in parts)), [x for _, more in parts for x in more]
@@ -141,13 +146,62 @@ def _one_model(name: str, model: Any) -> tuple[Tree, list[Leaf]]:
     """A model taken apart: with batch axes if its R or its Q has them."""
     noise = [getattr(model, key) for key in ("R", "Q") if hasattr(model, key)]
     batched = any(np.ndim(matrix) > 2 for matrix in noise)
-    tree, leaves = flatten(name, model, 2 if batched else None)
+    tree, leaves = flatten(name, model, 2 if batched else None, opened=batched)
     if batched and tree.fixed is not None:
         raise ValueError(
             f"{name} must be a dataclass if it has batch axes, so that its arrays are known; found "
             f"{type(model).__name__}"
         )
     return tree, leaves
+
+
+def probe_models(job: Job, problem: Problem) -> None:
+    """Call the model's functions for one configuration and for several, as chunks of them will.
+
+    Parameters
+    ----------
+    job : Job
+    problem : Problem
+
+    Raises
+    ------
+    ValueError
+        As of :mod:`navfilters.model_checks`.
+    """
+    for size in (1, SEVERAL):
+        march = March(job, problem.chunk(0, size).arrays)
+        mean = march.prior.mean
+        try:
+            if not march.remembers:
+                model_checks.sensor(march.model, mean, name="priors")
+                continue
+            if not _of_this_library(march):
+                return
+            dynamics, sensor = march.model
+            model_checks.dynamics(dynamics, mean, name="model[0]")
+            model_checks.sensor(sensor, mean, name="priors")
+        except ValueError as error:
+            if not any(leaf.core and leaf.name.startswith("model") for leaf in problem.leaves):
+                raise
+            raise ValueError(
+                f"{error}. (In a sweep a model's arrays that differ between configurations are "
+                "fields of a dataclass, not in a closure, and those that are no matrices say so: "
+                'field(metadata={"axes": number}).)'
+            ) from error
+
+
+def _of_this_library(march: March) -> bool:
+    """Whether a filter with a memory asks of its models what ``navfilters.robust`` does.
+
+    One whose state is no Gaussian, or whose dynamics have no transition, has an interface of its
+    own with them.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            state = march.estimator.init(march.prior)
+    except Exception:  # the first step will tell, and name the configuration
+        return False
+    return hasattr(march.model[0], "transition") and "estimate" in getattr(state, "_fields", ())
 
 
 def _with_members(leaf: Leaf, batch: tuple[int, ...]) -> Leaf:

@@ -7,7 +7,9 @@ compiles.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
-from functools import partial
+from functools import cached_property, partial
+from numbers import Real
+from types import BuiltinFunctionType, FunctionType, SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,6 +35,15 @@ class Fixed:
 
     def __hash__(self) -> int:
         return hash(self.value) if _hashable(self.value) else id(self.value)
+
+    @property
+    def constant(self) -> bool:
+        """Whether it is certain that the same value will do the same later on."""
+        value = self.value
+        if isinstance(value, FunctionType):
+            return value.__closure__ is None and not value.__dict__
+        simple = bool | Real | complex | str | bytes | np.generic | type | BuiltinFunctionType
+        return value is None or isinstance(value, simple)
 
 
 def _hashable(value: Any) -> bool:
@@ -74,6 +85,11 @@ class Tree:
         if self.fixed is not None:
             return self.fixed.value is None
         return all(part.only_arrays for part in self.parts)
+
+    @property
+    def constant(self) -> bool:
+        """Whether all that is fixed in it is :attr:`Fixed.constant`."""
+        return (self.fixed is None or self.fixed.constant) and all(p.constant for p in self.parts)
 
 
 class Leaf(NamedTuple):
@@ -131,7 +147,9 @@ class Leaf(NamedTuple):
         return np.ascontiguousarray(every[lead + index])
 
 
-def flatten(name: str, value: Any, core: int | None, lead: int = 0) -> tuple[Tree, list[Leaf]]:
+def flatten(
+    name: str, value: Any, core: int | None, lead: int = 0, *, opened: bool = False
+) -> tuple[Tree, list[Leaf]]:
     """Take a value apart.
 
     Parameters
@@ -145,44 +163,73 @@ def flatten(name: str, value: Any, core: int | None, lead: int = 0) -> tuple[Tre
         otherwise in its metadata, ``field(metadata={"axes": 2})``. None: no array has batch axes.
     lead : int
         Number of axes in front of the batch axes.
+    opened : bool
+        Whether arrays are looked for among the attributes of other objects too.
 
     Returns
     -------
     Tree
     list of Leaf
         From left to right.
+
+    Raises
+    ------
+    ValueError
+        An array that :func:`~navfilters.validation.plain` refuses.
     """
-    if core == 0 and isinstance(value, list | tuple) and value and _numbers(value):
+    if core == 0 and _numbers(value):
         value = validation.real_array(name, value, "")
     if hasattr(value, "__array_namespace__") and np.ndim(value):
-        return Tree(np.ndarray), [Leaf(name, np.asarray(value), core, lead)]
-    found = _parts(value)
+        return Tree(np.ndarray), [Leaf(name, np.asarray(validation.plain(name, value)), core, lead)]
+    found = _parts(value, opened)
     if found is None:
         return Tree(Fixed, fixed=Fixed(value)), []
     trees, leaves = [], []
     for label, part, axes in found:
         inside = f"{name}.{label}" if label else name
-        tree, more = flatten(inside, part, core if core is None or axes is None else axes, lead)
+        own = core if core is None or axes is None else axes
+        tree, more = flatten(inside, part, own, lead, opened=opened)
         trees.append(tree)
         leaves += more
     return Tree(type(value), tuple(label for label, *_ in found), tuple(trees)), leaves
 
 
-def _numbers(values: Iterable) -> bool:
-    return all(isinstance(v, int | float) for v in values)
+def _numbers(value: Any) -> bool:
+    """Whether value is a list, or a list of lists, of numbers; a named tuple has parts instead."""
+    if not isinstance(value, list | tuple) or hasattr(value, "_fields") or not value:
+        return False
+    return all(isinstance(v, Real | np.bool_) or _number(v) or _numbers(v) for v in value)
 
 
-def _parts(value: Any) -> list[tuple[str, Any, int | None]] | None:
+def _number(value: Any) -> bool:
+    return hasattr(value, "__array_namespace__") and np.ndim(value) == 0
+
+
+def _parts(value: Any, opened: bool) -> list[tuple[str, Any, int | None]] | None:
     """Names, values and declared numbers of axes of a value's parts; None if it has none."""
     if isinstance(value, partial):
         named = [("func", value.func, None), *(("", a, None) for a in value.args)]
         return named + [(name, a, None) for name, a in value.keywords.items()]
     if isinstance(value, tuple):
         names = getattr(value, "_fields", range(len(value)))
-        return [(str(name), part, None) for name, part in zip(names, value, strict=True)]
+        elements = [(str(name), part, None) for name, part in zip(names, value, strict=True)]
+        return elements + _attributes(value, set())
     if is_dataclass(value) and not isinstance(value, type):
-        return [(f.name, getattr(value, f.name), f.metadata.get("axes")) for f in fields(value)]
+        found = [(f.name, getattr(value, f.name), f.metadata.get("axes")) for f in fields(value)]
+        return found + _attributes(value, {f.name for f in fields(value)})
+    plain = type(value).__module__ != "builtins" and not isinstance(value, type | FunctionType)
+    if opened and plain and hasattr(value, "__dict__"):
+        return _attributes(value, set())
     return None
+
+
+def _attributes(value: Any, known: set[str]) -> list[tuple[str, Any, int | None]]:
+    """What an object has beside its fields, but for what it will compute again."""
+    return [
+        (name, part, None)
+        for name, part in getattr(value, "__dict__", {}).items()
+        if name not in known and not isinstance(getattr(type(value), name, None), cached_property)
+    ]
 
 
 def unflatten(tree: Tree, arrays: Iterable[Any]) -> Any:
@@ -214,8 +261,14 @@ def _grow(tree: Tree, arrays: Iterator[Any]) -> Any:
         keywords = {name: part for name, part in arguments if name}
         return partial(function, *(part for name, part in arguments if not name), **keywords)
     if issubclass(tree.kind, tuple):
-        return tree.kind(*parts) if hasattr(tree.kind, "_fields") else tuple(parts)
-    value = object.__new__(tree.kind)
+        size = len(getattr(tree.kind, "_fields", parts))
+        kind = tree.kind if hasattr(tree.kind, "_fields") else tuple
+        value: Any = tuple.__new__(kind, parts[:size])
+        named = named[size:]
+    elif issubclass(tree.kind, SimpleNamespace):
+        value = tree.kind()
+    else:
+        value = object.__new__(tree.kind)
     for name, part in named:
         object.__setattr__(value, name, part)
     return value
