@@ -311,3 +311,86 @@ def test_bad_input(change, error, message):
 def test_bad_system(change, error, message):
     with pytest.raises(error, match=message):
         replace(LINEAR, **change)
+
+
+# Functions that no complex step goes through: refused before the first step, or in it.
+
+
+def slowed(x, u, w, k):
+    """Drag, which has the derivative 0 at rest, by any method."""
+    return np.stack([x[..., 0] - 0.1 * x[..., 0] * abs(x[..., 0]) + w[..., 0]], -1)
+
+
+def pushed(x, u, w, k):
+    """The noise enters by its size, twice."""
+    return np.stack([x[..., 0] + w[..., 0] + 0.3 * np.sqrt(np.vecdot(w + 1, w + 1))], -1)
+
+
+def far(x, v, k):
+    return np.stack([x[..., 0] + 0.01 * np.linalg.norm(x + 3, axis=-1) + v[..., 0]], -1)
+
+
+def coloured(x, v, k):
+    return np.stack([x[..., 0] + v[..., 0] + 0.5 * (v[..., 0] + 1).real], -1)
+
+
+def bent_later(x, v, k):
+    """Analytic at the prior, not where the filter ends."""
+    x = x[..., :1]
+    return np.where(x.real < 5, x, x + 0.1 * np.abs(x)) + v
+
+
+SCALAR = DiscreteSystem(lambda x, u, w, k: x + w, lambda x, v, k: x + v, [[0.1]], [[0.1]])
+AT_REST = Gaussian(np.zeros(1), np.eye(1))
+HIDDEN = {
+    "F": ({"f": slowed}, "system.f must be analytic .* component 0 in column 0"),
+    "L": ({"f": pushed}, "system.f must be analytic"),
+    "H": ({"h": far}, "system.h must be analytic"),
+    "M": ({"h": coloured}, "system.h must be analytic"),
+    "the last": ({"h": bent_later}, "system.h must be analytic"),
+}
+
+
+@pytest.mark.parametrize("case", HIDDEN)
+@pytest.mark.parametrize("members", [(), (3,)])
+def test_a_function_that_is_not_analytic_is_refused(case, members):
+    change, message = HIDDEN[case]
+    y = np.full((4, *members, 1), 8.0)
+    with pytest.raises(TypeError, match=message):
+        extended_kalman_filter(replace(SCALAR, **change), AT_REST, y)
+
+
+def test_a_single_prediction_or_update_looks_too():
+    state = Gaussian(np.ones(1), np.eye(1))
+    with pytest.raises(TypeError, match=r"system\.f must be analytic"):
+        predict(replace(SCALAR, f=slowed), state, np.zeros(0), 0)
+    with pytest.raises(TypeError, match=r"system\.h must be analytic"):
+        update(replace(SCALAR, h=far), state, np.ones(1), 1)
+
+
+def test_with_its_jacobians_any_function_is_taken():
+    system = replace(
+        SCALAR,
+        f=slowed,
+        h=far,
+        F=lambda x, u, w, k: 1 - 0.2 * np.abs(x[..., None]),
+        H=lambda x, v, k: 1 + 0.01 * np.sign(x[..., None] + 3),
+    )
+    assert np.isfinite(extended_kalman_filter(system, AT_REST, np.ones((4, 1))).cov).all()
+
+
+def test_the_steps_do_not_look_again():
+    """Each further step costs the same few calls, for one member as for many."""
+    calls = []
+
+    def count(steps, members=()):
+        def f(x, u, w, k):
+            calls.append(k)
+            return x + w
+
+        calls.clear()
+        extended_kalman_filter(replace(SCALAR, f=f), AT_REST, np.ones((steps, *members, 1)))
+        return len(calls)
+
+    assert count(30) - count(20) == 10 * 3  # f itself, and a column of each of F and L
+    assert count(30, (50,)) == count(30)

@@ -130,3 +130,28 @@ def test_import_needs_numpy_only(module):
     code = f"import sys, {module}; print(*sorted({optional} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
+
+
+def exact_problem():
+    """Three members of which one knows a state, one a combination, and one nothing."""
+    v = np.array([2.0, -0.3, 0.7])
+    cov = np.stack([np.diag([2.0, 0.0, 1.0]), np.outer(v, v), np.eye(3), np.zeros((3, 3))])
+    model = quadratic(np.random.default_rng(1), 3, 3)
+    return Gaussian(np.ones((4, 3)) * 0.3, 0.1 * cov), np.zeros(3), model
+
+
+@pytest.mark.parametrize("name", ["UKF", "B-UKF", "UKFz"])
+@pytest.mark.parametrize("root", ["cholesky", "symmetric"])
+def test_what_is_known_exactly(name, root):
+    """Compiled as on the host, update after update, and NaN only where a member is indefinite."""
+    prior, z, model = exact_problem()
+    update = compiled(name, model, **options_of(name, root))
+    got = wanted = prior
+    for _ in range(3):
+        got, wanted = update(got, z), FILTERS[name](wanted, z, model, **options_of(name, root))
+        assert_agree(got, wanted, prior)
+    assert np.isfinite(got.mean).all()
+    bad = prior.cov.copy()
+    bad[2, 0, 0] = -1.0
+    finite = np.isfinite(update(Gaussian(prior.mean, bad), z).mean).all(axis=-1)
+    assert finite.tolist() == [True, True, False, True]

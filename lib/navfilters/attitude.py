@@ -9,6 +9,7 @@ Hamilton's product, which SciPy's ``Rotation`` has, is the same with the operand
 matrix of a ``Rotation``, which is active, is the transpose: T(q) = Rotation.from_quat(q)^T.
 """
 
+from navfilters._analytic import absolute, atan2, dot
 from navfilters.types import Array
 
 
@@ -93,7 +94,7 @@ def normalized(q: Array) -> Array:
         Not finite for the zero quaternion.
     """
     xp = q.__array_namespace__()
-    return q / xp.sqrt(xp.linalg.vecdot(q, q))[..., None]
+    return q / xp.sqrt(dot(q, q))[..., None]
 
 
 def matrix(q: Array) -> Array:
@@ -116,7 +117,7 @@ def matrix(q: Array) -> Array:
     """
     xp = q.__array_namespace__()
     v, s = q[..., :3], q[..., 3, None, None]
-    scalar = s * s - xp.linalg.vecdot(v, v)[..., None, None]
+    scalar = s * s - dot(v, v)[..., None, None]
     outer = v[..., :, None] * v[..., None, :]
     return scalar * xp.eye(3) + 2 * outer - 2 * s * cross_matrix(v)
 
@@ -145,9 +146,9 @@ def from_rotation_vector(theta: Array) -> Array:
     pogorelsky2020, Eqs. (25) and (37), which is 0/0 as printed for no rotation.
     """
     xp = theta.__array_namespace__()
-    angle = xp.sqrt(xp.linalg.vecdot(theta, theta))[..., None]
-    some = xp.where(angle > 0, angle, 1.0)
-    ratio = xp.where(angle > 0, xp.sin(some / 2) / some, 0.5)
+    angle = xp.sqrt(dot(theta, theta))[..., None]
+    some = xp.where(angle.real > 0, angle, 1.0)
+    ratio = xp.where(angle.real > 0, xp.sin(some / 2) / some, 0.5)
     return xp.concat([ratio * theta, xp.cos(angle / 2)], axis=-1)
 
 
@@ -170,7 +171,7 @@ def rotation_vector(q: Array) -> Array:
     """
     xp = q.__array_namespace__()
     v, s = q[..., :3], q[..., 3:]
-    sine = xp.sqrt(xp.linalg.vecdot(v, v))[..., None]
-    some = xp.where(sine > 0, sine, 1.0)
-    ratio = xp.where(sine > 0, 2 * xp.atan2(some, xp.abs(s)) / some, 2.0)
-    return xp.where(s < 0, -ratio, ratio) * v
+    sine = xp.sqrt(dot(v, v))[..., None]
+    some = xp.where(sine.real > 0, sine, 1.0)
+    ratio = xp.where(sine.real > 0, 2 * atan2(some, absolute(s)) / some, 2.0)
+    return xp.where(s.real < 0, -ratio, ratio) * v

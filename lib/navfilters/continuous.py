@@ -7,13 +7,15 @@ only the upper triangle, so that it cannot become asymmetric.
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.integrate
 from scipy.integrate import solve_ivp
 
 from navfilters import validation
-from navfilters.derivatives import check_model, jacobian
+from navfilters.derivatives import around, check_model, examine, jacobian
 from navfilters.probing import probe
 from navfilters.types import Array, Gaussian
 
@@ -38,7 +40,8 @@ class ContinuousSystem:
         (x, u, w, t) -> (n, n), (n, m), (n, w): the Jacobians of f in x, u and w.
     C, M : callable, optional
         (x, v, t) -> (p, n), (p, v): the Jacobians of h in x and v. Those not given are computed by
-        :func:`~navfilters.derivatives.complex_step`.
+        :func:`~navfilters.derivatives.complex_step`, and compared with differences at the start
+        and the end of a filter: f and h must be analytic, without abs, norm or .real.
 
     Raises
     ------
@@ -76,9 +79,17 @@ class ContinuousSystem:
         -------
         callable
         """
-        if name in "ABL":
-            return jacobian(self.f, "ABL".index(name), getattr(self, name), name="system.f")
-        return jacobian(self.h, "CM".index(name), getattr(self, name), name="system.h")
+        return self._jacobians[name]
+
+    @cached_property
+    def _jacobians(self) -> dict[str, Callable[..., Array]]:
+        """All five; one object each, which knows whether it was compared with differences."""
+        owners = {"f": "ABL", "h": "CM"}
+        return {
+            J: jacobian(getattr(self, f), i, getattr(self, J), name=f"system.{f}")
+            for f, names in owners.items()
+            for i, J in enumerate(names)
+        }
 
 
 @dataclass(frozen=True)
@@ -160,8 +171,9 @@ def linearized_kalman_bucy(
     u : callable, optional
         t -> (m,): the actual input; by default the reference's.
     rtol, atol : float
-        Tolerances of the integrator. atol is in units of the prior's deviations (1 in the unit of a
-        component that has none), products of them for the covariance.
+        Tolerances of the integrator. atol is in units of the deviations that P has at the time,
+        products of them for the covariance itself; for a component that the prior knows exactly
+        they start from what the noise makes of it in a thousandth of the time.
     method : str
         Of ``scipy.integrate.solve_ivp``; "LSODA" or "Radau" where P decays much faster than the
         state moves.
@@ -179,7 +191,8 @@ def linearized_kalman_bucy(
         A wrong shape or value, a reference that does not satisfy its dynamics, a singular M R M^T;
         before the integration. What y, u or M R M^T become later is reported with its time.
     RuntimeError
-        The integrator stopped, with its time and reason.
+        The integrator stopped, with its time and reason; or P, as a correlation, has an eigenvalue
+        below -100 max(rtol, atol), at a step or at a time that is asked for, with what to do.
 
     Notes
     -----
@@ -201,6 +214,8 @@ def linearized_kalman_bucy(
     at = x_ref(t[0]), u_ref(t[0]), w_ref(t[0]), t[0]
     if at[1].size:
         probe("system.B", system.jacobian("B"), at, (at[0].size, at[1].size), ())
+    for s in (t[0], t[t.size // 2], t[-1]):
+        _examine(system, [x_ref(s)], u_ref(s), w_ref(s), v_ref(s), s)
     _check_reference(system, reference, t, residual_tol)
     A, B, L, C, M = (system.jacobian(name) for name in "ABLCM")
 
@@ -271,6 +286,7 @@ def extended_kalman_bucy(
     u = _signal("u", u, t[0], None)
     no_w, no_v = np.zeros(len(system.Q)), np.zeros(len(system.R))
     _probe(system, prior.mean, u(t[0]), no_w, no_v, t[0], y0.size)
+    _examine(system, around(prior), u(t[0]), no_w, no_v, t[0])
     A, L, C, M = (system.jacobian(name) for name in "ALCM")
 
     def model(s, x):
@@ -278,7 +294,9 @@ def extended_kalman_bucy(
         innovation = y(s) - system.h(*sensing)
         return system.f(*at), innovation, A(*at), L(*at), C(*sensing), M(*sensing)
 
-    return _integrate(system, model, prior, t, rtol, atol, method, None)
+    trajectory = _integrate(system, model, prior, t, rtol, atol, method, None)
+    _examine(system, [trajectory.mean[-1]], u(t[-1]), no_w, no_v, t[-1])
+    return trajectory
 
 
 def reference_residual(
@@ -428,6 +446,15 @@ def _probe(system, x, u, w, v, t, p) -> None:
     validation.covariance("M R M^T, from system.M and system.R,", M @ system.R @ M.T, definite=True)
 
 
+def _examine(system, states, u, w, v, t) -> None:
+    """The automatic Jacobians against differences, at some states."""
+    with np.errstate(all="ignore"):
+        for name in "ABL" if u.size else "AL":
+            examine(system.jacobian(name), [(x, u, w, t) for x in states])
+        for name in "CM":
+            examine(system.jacobian(name), [(x, v, t) for x in states])
+
+
 def _integrate(system, model, start, t, rtol, atol, method, origin) -> Trajectory:
     """Mean and Riccati equation together; origin(t) is added to the mean afterwards: Eq. (30)."""
     n = start.mean.size
@@ -454,17 +481,46 @@ def _integrate(system, model, start, t, rtol, atol, method, origin) -> Trajector
         P_dot = AP + AP.T - G.T @ G + L @ system.Q @ L.T
         return np.concatenate([drift + G.T @ whitened[:, -1], P_dot[upper]])
 
-    deviation = np.sqrt(np.diagonal(start.cov))
-    deviation = np.where(deviation > 0, deviation, 1.0)
-    units = np.concatenate([deviation, np.outer(deviation, deviation)[upper]])
+    floor = _smallest_deviations(start, model, system.Q, t)
+
+    def deviations(P):
+        variance = np.diagonal(P, axis1=-2, axis2=-1)
+        return np.maximum(np.sqrt(np.maximum(variance, 0.0)), floor)
+
+    def tolerance(state):
+        d = deviations(unpack(state)[1])
+        return atol * np.concatenate([d, np.outer(d, d)[upper]])
+
+    def check(times, P):
+        """P >= 0 as a correlation, to a hundred times what the integrator was allowed."""
+        d = deviations(P)
+        smallest = np.linalg.eigvalsh(P / d[..., :, None] / d[..., None, :])[..., 0]
+        limit = -min(100 * max(rtol, atol), 0.1)
+        if not (smallest >= limit).all():
+            k = np.unravel_index(np.argmax(~(smallest >= limit)), smallest.shape)
+            raise RuntimeError(
+                f"the covariance is lost at t = {times[k]:.6g}: as a correlation its smallest "
+                f"eigenvalue is {smallest[k]:.3g}, where {limit:.3g} is allowed. Reduce rtol and "
+                f"atol (now {rtol:g} and {atol:g}), or try method='Radau' or a less vague prior"
+            )
+
     first = np.concatenate([start.mean, start.cov[upper]])
-    span = t[0], t[-1]
+    # Time counts from the start: near zero a float has room for the first steps of a vague prior.
     with np.errstate(all="ignore"):  # a state that overflows stops the integrator, reported below
         solution = solve_ivp(
-            rate, span, first, method, dense_output=True, rtol=rtol, atol=atol * units
+            lambda s, state: rate(t[0] + s, state),
+            (0.0, t[-1] - t[0]),
+            first,
+            _following(method, tolerance),
+            dense_output=True,
+            rtol=rtol,
+            atol=tolerance(first),
         )
     if not solution.success:
-        raise RuntimeError(f"integration stopped at t = {solution.t[-1]:.6g}: {solution.message}")
+        raise RuntimeError(
+            f"integration stopped at t = {t[0] + solution.t[-1]:.6g}: {solution.message}"
+        )
+    check(t[0] + solution.t, unpack(solution.y.T)[1])
 
     def at(times):
         times = validation.real_array("times", times, "")
@@ -472,10 +528,48 @@ def _integrate(system, model, start, t, rtol, atol, method, origin) -> Trajector
         if times.size and (times.min() < t[0] - slack or times.max() > t[-1] + slack):
             found = f"{times.min():g} to {times.max():g}"
             raise ValueError(f"times must be within {t[0]:g} to {t[-1]:g}; found {found}")
-        state = np.moveaxis(solution.sol(times.ravel()), 0, -1).reshape(*times.shape, -1)
+        state = np.moveaxis(solution.sol(times.ravel() - t[0]), 0, -1).reshape(*times.shape, -1)
         mean, P = unpack(state)
+        check(times, P)
         if origin is not None:
             mean = mean + np.array([origin(s) for s in times.ravel()]).reshape(mean.shape)
         return Gaussian(mean, P)
 
     return Trajectory(t, at, *at(t))
+
+
+def _smallest_deviations(start, model, Q, t) -> np.ndarray:
+    """The deviations below which the tolerances do not follow P.
+
+    1e-15 of the prior's. For a component without one, what the noise makes of it in a thousandth of
+    the time; 1 if that is nothing.
+    """
+    n = start.mean.size
+    deviation = np.sqrt(np.diagonal(start.cov))
+    if (deviation > 0).all():
+        return 1e-15 * deviation
+    with np.errstate(all="ignore"):
+        *_, A, L, _, _ = model(t[0], start.mean)
+    h = 1e-3 * (t[-1] - t[0]) / n
+    P = start.cov
+    for _ in range(n):  # so often noise can pass from one component to the next
+        F = np.eye(n) + h * A
+        P = F @ P @ F.T + h * L @ Q @ L.T
+    grown = np.sqrt(np.diagonal(P))
+    grown = np.where((grown > 0) & np.isfinite(grown), grown, 1.0)
+    return np.where(deviation > 0, 1e-15 * deviation, grown)
+
+
+def _following(method: Any, tolerance: Callable) -> Any:
+    """The integrator of SciPy with an absolute tolerance that follows the state."""
+    base: Any = getattr(scipy.integrate, method, None) if isinstance(method, str) else method
+    if not (isinstance(base, type) and issubclass(base, scipy.integrate.OdeSolver)):
+        return method  # for SciPy to refuse
+
+    def step(solver):
+        solver.atol = tolerance(solver.y)
+        if base is scipy.integrate.LSODA:  # which keeps its own
+            solver._lsoda_solver._integrator.call_args[1] = solver.atol
+        return base._step_impl(solver)
+
+    return type("Following", (base,), {"_step_impl": step})

@@ -1,11 +1,17 @@
-"""Jacobians of functions for which none was given, exact to rounding."""
+"""Jacobians of functions for which none was given, exact to rounding, and looked at once."""
 
 from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from navfilters import validation
+from navfilters.types import Gaussian
+
+AGREEMENT = 1e-6
+"""Largest relative difference from a difference quotient, beyond the quotient's own error."""
 
 
 def complex_step(
@@ -36,19 +42,33 @@ def complex_step(
     ------
     TypeError
         f does not take complex numbers (``arctan2`` and ``hypot`` do not), or returns
-        real numbers although it depends on x (as after ``.real``, ``abs`` or ``norm``).
+        real numbers although it depends on x (as after ``.real``, ``abs`` or ``norm``), or is not
+        analytic: an element of the Jacobian differs from a central difference quotient.
     ValueError
         x is not a real array of at least one axis.
 
     Notes
     -----
-    A sum in which only one term lost its imaginary part cannot be told from a right one: write
-    sqrt(x @ x) for the norm, and compare a new f once with differences.
+    ``vecdot`` conjugates, ``abs`` and ``norm`` forget the phase: write sqrt(x @ x) for the norm.
+    The quotient is a check with an error bound of its own, never the result. Where f has a kink, or
+    its rounding drowns the quotient, there is nothing to compare with, and nothing is refused.
     """
-    name = name or getattr(f, "__qualname__", repr(f))
+    called = str(name or getattr(f, "__qualname__", repr(f)))
+    x = _real_vector(x)
+    J = _by_complex_step(f, x, step, called)
+    _compare_with_differences(f, x, J, called)
+    return J
+
+
+def _real_vector(x: Any) -> np.ndarray:
     x = np.asarray(validation.plain("x", x))
     if x.dtype.kind not in "iuf" or x.ndim == 0:
         raise ValueError(f"x must be a real array (..., n); found {x.dtype}, shape {x.shape}")
+    return x
+
+
+def _by_complex_step(f: Callable, x: np.ndarray, step: float, name: str) -> np.ndarray:
+    """The Jacobian as it comes, without the comparison: what a filter calls at every step."""
     columns = []
     for j in range(x.shape[-1]):
         z = x.astype(complex)
@@ -76,6 +96,150 @@ def _depends(f: Callable, x: np.ndarray, j: int) -> bool:
     return not np.array_equal(f(moved), f(x), equal_nan=True)
 
 
+def _compare_with_differences(f, x, J, name, core=None) -> None:
+    """Refuse a Jacobian that central difference quotients contradict.
+
+    An element is confirmed by one quotient that is sharp and agrees. It is refused if none
+    confirms it, and two, of different lengths, agree with each other and not with it. The value of
+    f has core trailing axes; by default those that x has not.
+    """
+    x = x.astype(float)
+    batch = x.ndim - 1
+    core = max(J.ndim - x.ndim, min(batch, 1)) if core is None else core
+    beside = (..., *(None,) * core, slice(None))  # x's axes beside those of J
+    size = np.where(x == 0, 1.0, np.abs(x))
+    largest = np.broadcast_to(np.max(size, axis=-1, keepdims=True), x.shape)
+    no_scale = np.where(x == 0, 1e-6, 1.0)
+    confirmed, refused = (np.zeros(J.shape, bool) for _ in range(2))
+    against, margin = np.full(J.shape, np.nan), np.zeros(J.shape)
+    lengths = [r * size for r in (1e-3, 1e-2, 1e-4, 1e-5, 1e-7, 1e-9)]
+    lengths[1:1] = [1e-3 * largest]
+    lengths += [r * size * no_scale for r in (1e-6, 1e-9)]
+    with np.errstate(all="ignore"):
+        for length in lengths:
+            h = 2.0 ** np.round(np.log2(length))  # x + h is then exact, or nearly so
+            columns = [_quotient(f, x, h, j, core) for j in range(x.shape[-1])]
+            found, error, smooth = (np.stack(p, axis=-1) for p in zip(*columns, strict=True))
+            error = error + np.finfo(float).eps * (size / h)[beside] * np.abs(found)
+            largest_of = np.maximum(np.abs(J), np.abs(found))
+            change = largest_of * size[beside]
+            matters = np.maximum(change, 1e-3 * np.max(change, axis=-1, keepdims=True))
+            sharp = (error * size[beside] <= 10 * AGREEMENT * matters) | np.isnan(J)
+            off = np.abs(J - found)
+            agrees = ~(off > error + AGREEMENT * largest_of)
+            confirmed = confirmed | (agrees & sharp)
+            contradicts = ~agrees & smooth & (error <= 1e-2 * off)
+            alike = np.abs(found - against) <= error + margin + 1e-2 * np.abs(found)
+            refused = refused | (contradicts & alike)
+            first = contradicts & np.isnan(against)
+            against, margin = np.where(first, found, against), np.where(first, error, margin)
+            if np.all(confirmed):
+                return
+    refused = refused & ~confirmed
+    if refused.any():
+        at = tuple(int(k) for k in np.argwhere(refused)[0])
+        member, row, j = at[: refused.ndim - 1 - core], at[refused.ndim - 1 - core : -1], at[-1]
+        component = f"component {', '.join(map(str, row))}" if row else "the value"
+        where = f", in the member at index {member}" if member else ""
+        raise TypeError(
+            f"{name} must be analytic for its Jacobian by complex step: the derivative of "
+            f"{component} in column {j}, with respect to element {j} of the argument, is "
+            f"{np.broadcast_to(J, refused.shape)[at]:.6g} by complex step and {against[at]:.6g} by "
+            f"differences{where}. abs, norm, vecdot, conj, .real and arrays of real numbers lose "
+            "or turn imaginary parts: write sqrt(x @ x) for a norm, where(x.real < 0, -x, x) for "
+            "abs; and differences of nearly equal terms lose digits. Give its Jacobian instead "
+            "where that cannot be helped"
+        )
+
+
+def _quotient(f, x, h, j, core) -> tuple:
+    """df/dx_j by differences of sixth order, a bound on its error, and whether to believe both.
+
+    The bound: a hundred times what the sixth order changes in the fourth, and the sixth difference,
+    which is large at a kink and, where f is smooth, thirty times its rounding. They hold only where
+    the points follow f: not if it turns, or has a spike, between them.
+    """
+    step = h[..., j]
+    middle = np.asarray(f(x)).real
+
+    def at(k):
+        moved = x.copy()
+        moved[..., j] += k * step
+        try:
+            return np.asarray(f(moved)).real
+        except (ValueError, ArithmeticError, IndexError):  # outside of where f is defined
+            return np.full(middle.shape, np.nan)
+
+    ahead, behind = [at(k) for k in (1, 2, 3)], [at(-k) for k in (1, 2, 3)]
+    eps = np.finfo(middle.dtype if middle.dtype.kind == "f" else float).eps
+    a, b, c = (p - q for p, q in zip(ahead, behind, strict=True))
+    sums = [p + q for p, q in zip(ahead, behind, strict=True)]
+    per_step = 1 / step[(..., *(None,) * core)]
+    quotient = (45 * a - 9 * b + c) / 60 * per_step
+    fourth = (8 * a - b) / 12 * per_step
+    sixth = sums[2] - 6 * sums[1] + 15 * sums[0] - 20 * middle
+    largest = np.max(np.abs(np.stack([middle, *ahead, *behind])), axis=0)
+    rounding = 20 * eps * largest
+    gap = np.abs(quotient - fourth)
+    error = 100 * gap + (10 * np.abs(sixth) + rounding) * per_step
+    smooth = (gap <= 1e-2 * np.abs(quotient) + rounding * per_step) & (
+        np.abs(sixth) <= 1e-2 * (np.abs(a) + np.abs(b) + np.abs(c)) + 10 * rounding
+    )
+    return quotient, np.where(np.isfinite(error), error, np.inf), smooth
+
+
+@dataclass(eq=False)
+class ByComplexStep:
+    """The Jacobian of a function of several arguments in one of them.
+
+    Called with the function's arguments it returns (..., m, n). The first call, and every
+    :meth:`examine`, compares it with differences; later calls do not.
+
+    Parameters
+    ----------
+    function : callable
+        Of several arguments; returns (..., m).
+    position : int
+        Which of them, from 0; an array (..., n).
+    name : str
+        What to call function in an error.
+    """
+
+    function: Callable
+    position: int
+    name: str
+    examined: bool = False
+
+    def __call__(self, *arguments: Any) -> np.ndarray:
+        if not self.examined:
+            return self.examine(*arguments)
+        f, x = self._of_one(arguments)
+        return _by_complex_step(f, x, 1e-30, self.name)
+
+    def examine(self, *arguments: Any) -> np.ndarray:
+        """The Jacobian, compared with differences: TypeError as of :func:`complex_step`.
+
+        Parameters
+        ----------
+        *arguments
+            Of the function.
+
+        Returns
+        -------
+        ndarray (..., m, n)
+        """
+        f, x = self._of_one(arguments)
+        J = _by_complex_step(f, x, 1e-30, self.name)
+        _compare_with_differences(f, x, J, self.name, core=1)
+        self.examined = True
+        return J
+
+    def _of_one(self, arguments: tuple) -> tuple[Callable, np.ndarray]:
+        before, after = arguments[: self.position], arguments[self.position + 1 :]
+        x = _real_vector(arguments[self.position])
+        return (lambda z: self.function(*before, z, *after)), x
+
+
 def jacobian(
     function: Callable, position: int, given: Callable | None, *, name: str
 ) -> Callable[..., np.ndarray]:
@@ -95,16 +259,50 @@ def jacobian(
     Returns
     -------
     callable
-        Of the same arguments; returns (..., m, n).
+        Of the same arguments; returns (..., m, n). By complex step it is compared with differences
+        when first called, and whenever :func:`examine` asks.
     """
-    if given is not None:
-        return given
+    return ByComplexStep(function, position, name) if given is None else given
 
-    def by_complex_step(*arguments):
-        before, after = arguments[:position], arguments[position + 1 :]
-        return complex_step(lambda z: function(*before, z, *after), arguments[position], name=name)
 
-    return by_complex_step
+def examine(derivative: Callable, points: list[tuple]) -> None:
+    """Compare a Jacobian by complex step with differences; one that was given is left alone.
+
+    Parameters
+    ----------
+    derivative : callable
+        What :func:`jacobian` returned.
+    points : list of tuple
+        Arguments to call it with. Where the function is not defined nothing is compared.
+
+    Raises
+    ------
+    TypeError
+        As of :func:`complex_step`.
+    """
+    if not isinstance(derivative, ByComplexStep):
+        return
+    for arguments in points:
+        with suppress(ValueError, ArithmeticError, IndexError):
+            derivative.examine(*arguments)
+
+
+def around(estimate: Gaussian) -> list[np.ndarray]:
+    """Where to look at a Jacobian: the mean, and all its elements a deviation more, and less.
+
+    At the mean alone much is hidden: x abs(x) has the derivative 0 at 0, by any method.
+
+    Parameters
+    ----------
+    estimate : Gaussian
+        mean (..., n), cov (..., n, n).
+
+    Returns
+    -------
+    list of ndarray (..., n)
+    """
+    deviation = np.sqrt(np.diagonal(estimate.cov, axis1=-2, axis2=-1))
+    return [estimate.mean, estimate.mean + deviation, estimate.mean - deviation]
 
 
 def check_model(model: Any, functions: tuple[str, ...], derivatives: tuple[str, ...]) -> None:

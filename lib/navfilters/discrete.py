@@ -7,12 +7,13 @@ The update is :func:`~navfilters.filters.kalman_update`, the one of every other 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from navfilters import validation
-from navfilters.derivatives import check_model, jacobian
+from navfilters.derivatives import around, check_model, examine, jacobian
 from navfilters.filters import kalman_update
 from navfilters.probing import members
 from navfilters.types import Array, Gaussian, Moments
@@ -36,7 +37,8 @@ class DiscreteSystem:
         (x, u, w, k) -> (..., n, n) and (..., n, w): the Jacobians of f in x and w.
     H, M : callable, optional
         (x, v, k) -> (..., p, n) and (..., p, v): the Jacobians of h in x and v. Those not given are
-        computed by :func:`~navfilters.derivatives.complex_step`.
+        computed by :func:`~navfilters.derivatives.complex_step`, and compared with differences
+        when they are first needed: f and h must be analytic, without abs, norm or .real.
 
     Raises
     ------
@@ -62,6 +64,17 @@ class DiscreteSystem:
     def __post_init__(self) -> None:
         check_model(self, ("f", "h"), ("F", "L", "H", "M"))
 
+    @cached_property
+    def _jacobians(self) -> dict[str, Callable[..., Array]]:
+        """F, L, H and M, given or by complex step; one object each, which knows its past."""
+        of_f = (self.f, "system.f")
+        of_h = (self.h, "system.h")
+        wanted = {"F": (*of_f, 0), "L": (*of_f, 2), "H": (*of_h, 0), "M": (*of_h, 1)}
+        return {
+            J: jacobian(function, position, getattr(self, J), name=name)
+            for J, (function, name, position) in wanted.items()
+        }
+
     def motion_jacobians(self, x: Array, u: Array, k: int) -> tuple[Array, Array]:
         """F (..., n, n) and L (..., n, w) at the state x, with w = 0: Eqs. (81)-(82).
 
@@ -77,9 +90,8 @@ class DiscreteSystem:
         tuple of array
         """
         at, n = (x, u, np.zeros(len(self.Q)), k), x.shape[-1]
-        F = jacobian(self.f, 0, self.F, name="system.f")
-        L = jacobian(self.f, 2, self.L, name="system.f")
-        return _fits("system.F", F(*at), (n, n)), _fits("system.L", L(*at), (n, len(self.Q)))
+        F, L = self._jacobians["F"](*at), self._jacobians["L"](*at)
+        return _fits("system.F", F, (n, n)), _fits("system.L", L, (n, len(self.Q)))
 
     def measurement_jacobians(self, x: Array, k: int) -> tuple[Array, Array]:
         """H (..., p, n) and M (..., p, v) at the state x, with v = 0: Eqs. (85)-(86).
@@ -95,8 +107,7 @@ class DiscreteSystem:
         tuple of array
         """
         at = x, np.zeros(len(self.R)), k
-        H = jacobian(self.h, 0, self.H, name="system.h")(*at)
-        M = jacobian(self.h, 1, self.M, name="system.h")(*at)
+        H, M = self._jacobians["H"](*at), self._jacobians["M"](*at)
         H = _fits("system.H", H, (np.shape(H)[-2] if np.ndim(H) > 1 else 1, x.shape[-1]))
         return H, _fits("system.M", M, (H.shape[-2], len(self.R)))
 
@@ -213,6 +224,7 @@ def extended_kalman_filter(
         for k in range(len(y)):
             state = update(system, predict(system, state, u[k], k), y[k], k + 1)
             states.append(state)
+        _examine(system, [state.mean], u[-1], len(y) - 1)  # where it has come to
     return Gaussian(np.stack([s.mean for s in states]), np.stack([s.cov for s in states]))
 
 
@@ -250,16 +262,21 @@ def _check(system: DiscreteSystem, prior: Gaussian, y: np.ndarray, u: np.ndarray
     prior = Gaussian(
         np.broadcast_to(prior.mean, (*batch, n)), np.broadcast_to(prior.cov, (*batch, n, n))
     )
-    at = prior.mean, u[0], np.zeros(w), 0
-    F = jacobian(system.f, 0, system.F, name="system.f")
-    L = jacobian(system.f, 2, system.L, name="system.f")
+    at, sensing = (prior.mean, u[0], np.zeros(w), 0), (prior.mean, np.zeros(v), 1)
+    J = system._jacobians
     members("system.f", system.f, at, 2, (n,), batch, whole=True)
-    members("system.F", F, at, 2, (n, n), batch, whole=False)
-    members("system.L", L, at, 2, (n, w), batch, whole=False)
-    sensing = prior.mean, np.zeros(v), 1
-    H = jacobian(system.h, 0, system.H, name="system.h")
-    M = jacobian(system.h, 1, system.M, name="system.h")
+    members("system.F", J["F"], at, 2, (n, n), batch, whole=False)
+    members("system.L", J["L"], at, 2, (n, w), batch, whole=False)
     members("system.h", system.h, sensing, 1, (p,), batch, whole=True)
-    members("system.H", H, sensing, 1, (p, n), batch, whole=False)
-    members("system.M", M, sensing, 1, (p, v), batch, whole=False)
+    members("system.H", J["H"], sensing, 1, (p, n), batch, whole=False)
+    members("system.M", J["M"], sensing, 1, (p, v), batch, whole=False)
+    with np.errstate(all="ignore"):
+        _examine(system, around(prior), u[0], 0)
     return prior
+
+
+def _examine(system: DiscreteSystem, states: list[np.ndarray], u: np.ndarray, k: int) -> None:
+    """The automatic Jacobians against differences: f's from step k, h's at the step after it."""
+    no_w, no_v = np.zeros(len(system.Q)), np.zeros(len(system.R))
+    for name, J in system._jacobians.items():
+        examine(J, [(x, u, no_w, k) if name in "FL" else (x, no_v, k + 1) for x in states])

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from navfilters import linalg, probing, validation
+from navfilters import linalg, model_checks, validation
 from navfilters._memory import keep_freed_memory
 from navfilters.types import Array, Gaussian, MeasurementModel
 
@@ -71,8 +71,8 @@ def run(
     steps = validation.whole_number("steps", steps, 0)
     z_varies = validation.flag("z_varies", z_varies)
     prior = validation.gaussian("prior", prior)
-    z, batch = probing.measurements(z, prior, model, steps, z_varies)
-    probing.sensor(model, prior.mean)
+    z, batch = model_checks.measurements(z, prior, model, steps, z_varies)
+    model_checks.sensor(model, prior.mean)
     keep_freed_memory()
     state, states = prior, [prior]
     with np.errstate(all="ignore"):  # a member that fails is NaN in the result: that is its report

@@ -16,9 +16,9 @@ from functools import lru_cache
 import numpy as np
 
 from navfilters import validation
-from navfilters.linalg import matmul, right_divide, spectral_norm
+from navfilters.linalg import keep_exact, matmul, right_divide, spectral_norm
 from navfilters.moments import linearized, noise, second_order, unscented
-from navfilters.types import Array, Gaussian, MeasurementModel, Moments
+from navfilters.types import Array, ExactMoments, Gaussian, MeasurementModel, Moments
 
 Variant = Callable[..., tuple[Gaussian, Moments]]
 
@@ -77,7 +77,10 @@ def kalman_update(prior: Gaussian, z: Array, moments: Moments) -> Gaussian:
         raise
     mean = prior.mean + matmul(K, residual[..., None])[..., 0]
     reduction = matmul(K, moments.P_xz.mT)
-    return Gaussian(mean, prior.cov - (reduction + reduction.mT) / 2)
+    cov = prior.cov - (reduction + reduction.mT) / 2
+    if isinstance(moments, ExactMoments):
+        cov = keep_exact(cov, moments.exact)
+    return Gaussian(mean, cov)
 
 
 def unchanged(prior: Gaussian, model: MeasurementModel, moments: Moments):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from navfilters import validation
+from navfilters._analytic import dot
 from navfilters._extras import needed
 from navfilters.types import Array
 
@@ -107,12 +108,13 @@ def ellipsoid_intersection(r: Array, direction: Array) -> Array:
     xp = r.__array_namespace__()
     axes, u = xp.asarray(_AXES), _unit(direction)
     start, along = r / axes, u / axes
-    a, b = xp.linalg.vecdot(along, along), xp.linalg.vecdot(start, along)
-    c = xp.linalg.vecdot(start, start) - 1
-    _refuse(c < 0, start, "r must be outside of the WGS-84 ellipsoid; found a start below it by")
+    a, b = dot(along, along), dot(start, along)
+    c = dot(start, start) - 1
+    inside = c.real < 0
+    _refuse(inside, start, "r must be outside of the WGS-84 ellipsoid; found a start below it by")
     discriminant = b * b - a * c
-    nearest = start + xp.where(b < 0, -b / a, 0.0)[..., None] * along
-    misses = (discriminant < 0) | (b > 0)
+    nearest = start + xp.where(b.real < 0, -b / a, 0.0)[..., None] * along
+    misses = (discriminant.real < 0) | (b.real > 0)
     _refuse(
         misses, nearest, "direction must meet the WGS-84 ellipsoid; found one that misses it by"
     )
@@ -242,4 +244,4 @@ def _pymap3d() -> Any:
 
 def _unit(v: Array) -> Array:
     xp = v.__array_namespace__()
-    return v / xp.sqrt(xp.linalg.vecdot(v, v))[..., None]
+    return v / xp.sqrt(dot(v, v))[..., None]

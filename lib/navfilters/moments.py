@@ -11,7 +11,7 @@ import numpy as np
 
 from navfilters import linalg, validation
 from navfilters.linalg import matmul, outer_sum
-from navfilters.types import Array, Gaussian, MeasurementModel, Moments
+from navfilters.types import Array, ExactMoments, Gaussian, MeasurementModel, Moments
 
 
 def linearized(prior: Gaussian, model: MeasurementModel) -> Moments:
@@ -155,7 +155,7 @@ class SigmaPoints:
 
     def __post_init__(self) -> None:
         if self.root not in ROOTS:
-            raise ValueError(f"root must be one of {sorted(ROOTS)}; found {self.root!r}")
+            raise ValueError(f"root must be one of {list(ROOTS)}; found {self.root!r}")
         for name in ("alpha", "beta") if self.kappa is None else ("alpha", "beta", "kappa"):
             value = validation.real_array(name, getattr(self, name), "")
             if name == "alpha" and (value <= 0).any():
@@ -189,7 +189,24 @@ class SigmaPoints:
         return xp.sqrt(scale), W0_m, W0_m + 1 - alpha**2 + beta, 0.5 / scale
 
 
-ROOTS = {"cholesky": linalg.cholesky, "symmetric": linalg.symmetric_root}
+ROOTS = ("cholesky", "symmetric")
+
+
+def _root(cov: Array, kind: str) -> tuple[Array, Array | None]:
+    """The root of a covariance whose columns become the points, and what it knows exactly.
+
+    A state or a combination without variance has no points of its own. A covariance that is
+    positive definite has the root that it always had, to the last bit.
+    """
+    S, exact = linalg.semidefinite_root(cov)
+    if kind == "symmetric":
+        S = linalg.symmetric_root(cov, None if exact is None else _is_singular(exact))
+    return S, exact
+
+
+def _is_singular(exact: Array) -> Array:
+    xp = exact.__array_namespace__()
+    return xp.any(xp.linalg.diagonal(exact) == 0, axis=-1)
 
 
 def sigma_points(prior: Gaussian, points: SigmaPoints) -> Array:
@@ -206,21 +223,26 @@ def sigma_points(prior: Gaussian, points: SigmaPoints) -> Array:
     -------
     array (2 n + 1, ..., n)
         The points in *front* of the batch axes, so that a model's own batch axes still line up.
-        NaN, except the mean, where cov has no square root.
+        NaN, except the mean, where cov has no square root: where it is not positive semidefinite.
 
     References
     ----------
     perea2007, Eq. (21).
     """
+    return prior.mean + _offsets(prior, points, _root(prior.cov, points.root)[0])
+
+
+def _offsets(prior: Gaussian, points: SigmaPoints, root: Array) -> Array:
+    """What the points have that the mean has not, with all the batch axes of both."""
     xp = prior.cov.__array_namespace__()
     n = prior.mean.shape[-1]
     gamma, *_ = points.weights(n, xp)
     if gamma.ndim:
-        validation.batch(points=gamma.shape, prior=prior.cov.shape[:-2])
-    S = gamma[..., None, None] * ROOTS[points.root](prior.cov)
+        validation.batch(points=gamma.shape, prior=root.shape[:-2])
+    S = gamma[..., None, None] * root
     batch = xp.broadcast_shapes(S.shape[:-2], prior.mean.shape[:-1])
     columns = xp.moveaxis(xp.broadcast_to(S, (*batch, n, n)), -1, 0)
-    return prior.mean + xp.concat([xp.zeros_like(columns[:1]), columns, -columns], axis=0)
+    return xp.concat([xp.zeros_like(columns[:1]), columns, -columns], axis=0)
 
 
 def unscented(
@@ -244,12 +266,16 @@ def unscented(
     -------
     Moments
         z_hat (..., m), P_zz (..., m, m), P_xz (..., n, m); NaN where cov has no square root.
+        ``ExactMoments`` if some member's cov is singular.
 
     References
     ----------
     perea2007, Eqs. (21)-(25); its Eq. (26) is empty.
     """
-    X = sigma_points(prior, points)
+    root, exact = _root(prior.cov, points.root)
+    X = prior.mean + _offsets(prior, points, root)
+    if exact is None:
+        del root  # a batch fills the cache
     xp = X.__array_namespace__()
     R = noise(model)
     missing = R.ndim - X.ndim  # batch axes that only the model has go behind the points' axis
@@ -260,6 +286,10 @@ def unscented(
     # cancel.
     z_hat = Z[0] + W_i[..., None] * xp.sum(Z[1:] - Z[0], axis=0)
     dX, dZ = X - prior.mean, Z - z_hat
+    if exact is not None:  # what is known as a combination must not see the rounding of the mean
+        offsets = xp.reshape(_offsets(prior, points, root), X.shape)
+        dX = xp.where(_is_singular(exact)[..., None], offsets, dX)
     W0_c, W_i = W0_c[..., None, None], W_i[..., None, None]
     P_zz = R + W0_c * outer_sum(dZ[:1], dZ[:1]) + W_i * outer_sum(dZ[1:], dZ[1:])
-    return Moments(z_hat, P_zz, W_i * outer_sum(dX[1:], dZ[1:]))
+    moments = Moments(z_hat, P_zz, W_i * outer_sum(dX[1:], dZ[1:]))
+    return moments if exact is None else ExactMoments.of(moments, exact)

@@ -50,6 +50,40 @@ class Moments(NamedTuple):
     P_xz: Array
 
 
+class ExactMoments(Moments):
+    """The moments of a prior that knows something exactly, for the update to keep.
+
+    Still a tuple of three: it unpacks as :class:`Moments` does.
+
+    Attributes
+    ----------
+    exact : array (..., n, n) or None
+        T of :func:`navfilters.linalg.semidefinite_root` of the prior's covariance.
+    """
+
+    exact: Array = None
+
+    @classmethod
+    def of(cls, moments: Moments, exact: Array) -> "ExactMoments":
+        """The same moments with what their prior knows.
+
+        Parameters
+        ----------
+        moments : Moments
+        exact : array (..., n, n)
+
+        Returns
+        -------
+        ExactMoments
+        """
+        made = cls(*moments)
+        made.exact = exact
+        return made
+
+    def _replace(self, **changes: Array) -> "ExactMoments":
+        return self.of(Moments(*self)._replace(**changes), self.exact)
+
+
 class MeasurementModel(Protocol):
     """z = h(x) + v with v ~ N(0, R); see ``navfilters.models`` for the members."""
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from navfilters import validation
+from navfilters._analytic import dot
 from navfilters.types import Array
 
 
@@ -56,7 +57,7 @@ class Gravity:
             m^2/s^2.
         """
         xp = r.__array_namespace__()
-        s = 1 / xp.linalg.vecdot(r, r)
+        s = 1 / dot(r, r)
         z = r[..., 2]
         return self.mu * xp.sqrt(s) * (1 - self._k * s * (z * z * s - 1 / 3))
 
@@ -79,7 +80,7 @@ class Gravity:
         """
         xp = r.__array_namespace__()
         z = r[..., 2]
-        s = 1 / xp.linalg.vecdot(r, r)
+        s = 1 / dot(r, r)
         of_sphere = (-self.mu * s) * xp.sqrt(s)
         of_J2 = (self._k * s) * of_sphere
         along = of_sphere + of_J2 * (1 - (5 * s) * (z * z))
@@ -104,7 +105,7 @@ class Gravity:
         xiong2009, the F of Eq. (4) for Eq. (36).
         """
         xp = r.__array_namespace__()
-        s = (1 / xp.linalg.vecdot(r, r))[..., None]
+        s = (1 / dot(r, r))[..., None]
         u = r * xp.sqrt(s)  # unit vector
         c = u[..., 2:]
         size, k = self.mu * s * xp.sqrt(s), self._k * s

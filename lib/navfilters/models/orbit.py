@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from navfilters import validation
+from navfilters._analytic import dot
 from navfilters.models.earth_fixed import EarthFixedOrbit as EarthFixedOrbit
 from navfilters.models.earth_fixed import runge_kutta
 from navfilters.models.gravity import EARTH, Gravity
@@ -215,7 +216,7 @@ class Orbit:
         v = x[..., 3:]
         a = self.gravity.acceleration(x[..., :3])
         if thrust:
-            a = a + v * (thrust / xp.sqrt(xp.linalg.vecdot(v, v)))[..., None]
+            a = a + v * (thrust / xp.sqrt(dot(v, v)))[..., None]
         return xp.concat([v, a], axis=-1)
 
     def jacobian(self, x: Array, thrust: Array | None = None) -> Array:
@@ -238,7 +239,7 @@ class Orbit:
         of_x = self.gravity.gradient(x[..., :3]) @ E_r
         if thrust is not None:
             v = x[..., 3:]
-            speed = xp.sqrt(xp.linalg.vecdot(v, v))
+            speed = xp.sqrt(dot(v, v))
             u = v / speed[..., None]
             across = xp.eye(3) - u[..., :, None] * u[..., None, :]
             of_x = of_x + (xp.asarray(thrust) / speed)[..., None, None] * (across @ E_v)
@@ -335,9 +336,9 @@ def perigee_apogee(x: Array, gravity: Gravity = EARTH) -> tuple[Array, Array]:
     """
     xp = x.__array_namespace__()
     r, v = x[..., :3], x[..., 3:]
-    distance = xp.sqrt(xp.linalg.vecdot(r, r))
-    v2, rv = xp.linalg.vecdot(v, v), xp.linalg.vecdot(r, v)
+    distance = xp.sqrt(dot(r, r))
+    v2, rv = dot(v, v), dot(r, v)
     a = 1 / (2 / distance - v2 / gravity.mu)
     ev = (v2 / gravity.mu - 1 / distance)[..., None] * r - (rv / gravity.mu)[..., None] * v
-    e = xp.sqrt(xp.linalg.vecdot(ev, ev))
+    e = xp.sqrt(dot(ev, ev))
     return a * (1 - e) - gravity.radius, a * (1 + e) - gravity.radius

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from navfilters import validation
+from navfilters._analytic import atan2, hypot
 from navfilters.linalg import matrix, vector
 from navfilters.types import Array
 
@@ -51,9 +52,8 @@ class RangeBearing:
         array (..., 2)
             Range in units, bearing in radians.
         """
-        xp = x.__array_namespace__()
         x1, x2 = x[..., 0], x[..., 1]
-        return vector([xp.hypot(x1, x2), xp.atan2(x2, x1)])
+        return vector([hypot(x1, x2), atan2(x2, x1)])
 
     def jacobian(self, x: Array) -> Array:
         """First derivatives, (..., 2, 2): rows range and bearing, columns x1 and x2.
@@ -66,9 +66,8 @@ class RangeBearing:
         -------
         array (..., 2, 2)
         """
-        xp = x.__array_namespace__()
         x1, x2 = x[..., 0], x[..., 1]
-        r = xp.hypot(x1, x2)
+        r = hypot(x1, x2)
         c, s = x1 / r, x2 / r
         return matrix([[c, s], [-s / r, c / r]])
 
@@ -85,7 +84,7 @@ class RangeBearing:
         """
         xp = x.__array_namespace__()
         x1, x2 = x[..., 0], x[..., 1]
-        r = xp.hypot(x1, x2)
+        r = hypot(x1, x2)
         c, s = x1 / r, x2 / r
         of_range = matrix([[s * s, -s * c], [-s * c, c * c]]) / r[..., None, None]
         sin_2, cos_2 = 2 * s * c, c * c - s * s

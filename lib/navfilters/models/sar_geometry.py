@@ -6,6 +6,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from navfilters import validation
+from navfilters._analytic import dot
 from navfilters.attitude import cross_matrix, matrix
 from navfilters.frames import antenna_axes
 from navfilters.types import Array
@@ -276,4 +277,4 @@ def _apply(T: Array, v: Array) -> Array:
 def _norm(v: Array) -> Array:
     """|v|, (..., 1)."""
     xp = v.__array_namespace__()
-    return xp.sqrt(xp.linalg.vecdot(v, v))[..., None]
+    return xp.sqrt(dot(v, v))[..., None]

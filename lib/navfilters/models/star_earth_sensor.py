@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from navfilters import validation
+from navfilters._analytic import atan2, dot
 from navfilters.types import Array
 
 
@@ -70,7 +71,7 @@ class StarEarthSensor:
         r = x[..., None, :3]
         u = xp.asarray(self.stars)
         w = xp.linalg.cross(u, r)
-        return xp.atan2(xp.sqrt(xp.linalg.vecdot(w, w)), -xp.linalg.vecdot(u, r))
+        return atan2(xp.sqrt(dot(w, w)), -dot(u, r))
 
     def jacobian(self, x: Array) -> Array:
         """H: across r and towards the star, 1 / norm(r) long; zero for the velocity.
@@ -118,10 +119,10 @@ class StarEarthSensor:
         xp = x.__array_namespace__()
         u = xp.asarray(self.stars)
         position = x[..., None, :3] + xp.zeros_like(u)
-        r = xp.sqrt(xp.linalg.vecdot(position, position))[..., None]
+        r = xp.sqrt(dot(position, position))[..., None]
         along = position / r
         w = xp.linalg.cross(u, along)
-        sine = xp.sqrt(xp.linalg.vecdot(w, w))[..., None]
+        sine = xp.sqrt(dot(w, w))[..., None]
         normal = w / sine
-        cotangent = xp.linalg.vecdot(u, along)[..., None] / sine
+        cotangent = dot(u, along)[..., None] / sine
         return along, xp.linalg.cross(along, normal), normal, r, cotangent

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from navfilters import probing, validation
+from navfilters import model_checks, validation
 from navfilters.sweeping.chunks import Chunk, Job, March
 from navfilters.sweeping.trees import Leaf, Tree, flatten
 from navfilters.types import Gaussian
@@ -51,7 +51,7 @@ class Problem:
         priors = validation.gaussian("priors", priors)
         remembers = hasattr(estimator, "step")
         sensor = model[1] if remembers else model
-        z, _ = probing.measurements(z, priors, sensor, steps, z_varies, "priors")
+        z, _ = model_checks.measurements(z, priors, sensor, steps, z_varies, "priors")
         if remembers and hasattr(model[0], "transition"):
             n = priors.mean.shape[-1]
             validation.covariance("model[0].Q", getattr(model[0], "Q", None), n, definite=False)
@@ -166,20 +166,20 @@ def probe_models(job: Job, problem: Problem) -> None:
     Raises
     ------
     ValueError
-        As of :mod:`navfilters.probing`.
+        As of :mod:`navfilters.model_checks`.
     """
     for size in (1, SEVERAL):
         march = March(job, problem.chunk(0, size).arrays)
         mean = march.prior.mean
         try:
             if not march.remembers:
-                probing.sensor(march.model, mean, name="priors")
+                model_checks.sensor(march.model, mean, name="priors")
                 continue
             if not _of_this_library(march):
                 return
             dynamics, sensor = march.model
-            probing.dynamics(dynamics, mean, name="model[0]")
-            probing.sensor(sensor, mean, name="priors")
+            model_checks.dynamics(dynamics, mean, name="model[0]")
+            model_checks.sensor(sensor, mean, name="priors")
         except ValueError as error:
             if not any(leaf.core and leaf.name.startswith("model") for leaf in problem.leaves):
                 raise
