@@ -433,7 +433,7 @@ def cramer_rao_bound(
     process_noise: bool = True,
     acceleration: float | None = None,
 ) -> Array:
-    """Smallest deviation of each position component that the measurements allow, at each second.
+    """Smallest deviation of each position component of an unbiased estimate, at each second.
 
     J_t = (F J_{t-1}^-1 F^T + Q)^-1 + H^T R^-1 H   along the true flight.
 
@@ -443,7 +443,8 @@ def cramer_rao_bound(
         A key of ``VARIANTS``, or a set-up of one noise.
     thrust : {"known", "unknown"}
         Unknown: whoever estimates knows when the thruster fires, but in each sampling interval
-        with fire its acceleration is another unknown constant vector.
+        with fire its acceleration is another unknown constant vector: one model of ignorance.
+        Whoever knows its direction and that its strength is constant can have far less.
     process_noise : bool
         Without, the limit of the experiment, whose truth has none; with the filters' Q, the limit
         for an orbit that is disturbed as the filters believe.
@@ -463,8 +464,9 @@ def cramer_rao_bound(
 
     Notes
     -----
-    The recursion is the covariance half of a Kalman filter that is linearised at the truth; P0 is
-    that of (40), though the first error (39) is not random. An unknown acceleration is appended to
+    The classical bound at one flight, with the first estimate as one more measurement: the
+    covariance half of a Kalman filter that is linearised at the truth. P0 is that of (40), though
+    the first error (39) is not random. An unknown acceleration is appended to
     the state. At measurement times alone, reading A has 650.6 m without and 682.0 m with Q; between
     them the uncertainty is a little larger.
     """
