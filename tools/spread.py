@@ -161,7 +161,9 @@ def main() -> None:
             found = measure(path, used, arguments.seeds, pool)
             bad += report(chapter, found, ledger)
             if not found.get("failed"):
-                stored[chapter] = found["claims"]
+                names = [variant.name for variant in used]
+                how = {"seeds": arguments.seeds, "variants": names}
+                stored[chapter] = how | {"claims": found["claims"]}
             if arguments.store:
                 STORED.write_text(json.dumps(stored, indent=1, sort_keys=True) + "\n", "utf-8")
     sys.stdout.write(f"{len(paths)} chapters, {bad} faults\n")
