@@ -6,7 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .ledger import OURS, PRINTED, VERDICTS, Claim, ClaimError, find, load, load_words
+from .ledger import (
+    OURS,
+    PRINTED,
+    SHAPE_OF_A_NUMBER,
+    VERDICTS,
+    Claim,
+    ClaimError,
+    find,
+    load,
+    load_words,
+)
 
 
 @dataclass(frozen=True)
@@ -129,20 +139,28 @@ def rules() -> Page:
     -------
     Page
     """
-    ledger, rows, lines = load().values(), [], []
-    for name, word in load_words().items():
-        using = [c for c in ledger if c.word == name]
-        same = sum(not c.own_rule for c in using)
+    ledger = load().values()
+    groups = [
+        (f"{name}: {word.meaning}", _rule(word.rule), [c for c in ledger if c.word == name])
+        for name, word in load_words().items()
+    ]
+    printed = [c for c in ledger if c.kind == "value" and c.threshold == PRINTED]
+    in_shape = f"in shape: {_rule(SHAPE_OF_A_NUMBER)}"
+    groups.append(("printed numbers: within their digits", in_shape, printed))
+    wordless = [c for c in ledger if c.threshold == OURS and not c.word]
+    groups.append(("readings of another kind", "each its own", wordless))
+    rows, lines = [], []
+    for name, rule, using in groups:
+        others = [c for c in using if c.own_rule]
         departures = "".join(
-            f'<div class="claim-reason">{_text(_at(c))}: {_text(c.own_rule)}</div>'
-            for c in using
-            if c.own_rule
+            f'<div class="claim-reason">{_text(_at(c))}: {_text(c.own_rule)}</div>' for c in others
         )
+        same = len(using) - len(others)
         rows.append(
-            f"<tr><td>{_text(name)}: {_text(word.meaning)}{departures}</td>"
-            f"<td>{_rule(word.rule)}</td><td>{same}</td><td>{len(using) - same}</td></tr>"
+            f"<tr><td>{_text(name)}{departures}</td><td>{rule}</td><td>{same}</td>"
+            f"<td>{len(others)}</td></tr>"
         )
-        lines.append(f"{name}: {_plain_rule(word.rule)}, {same} and {len(using) - same} others")
+        lines.append(f"{name.partition(':')[0]}: {same} and {len(others)} others")
     head = ("word", "rule", "claims", "others")
     return Page(table("claims-table claims-rules", head, rows), "\n".join(lines))
 
@@ -196,10 +214,6 @@ def _slug(verdict: str) -> str:
 
 def _text(text: str) -> str:
     return html.escape(text, quote=False)
-
-
-def _plain_rule(rule: Mapping) -> str:
-    return "; ".join(f"{key.replace('_', ' ')} {value:g}" for key, value in rule.items())
 
 
 def _rule(rule: Mapping) -> str:
