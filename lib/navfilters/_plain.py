@@ -67,7 +67,7 @@ def core(name: str, array: Array, shape: tuple[int, ...]) -> Array:
     ----------
     name : str
         What to call it in an error.
-    array : array (..., *shape)
+    array : array with at least these axes
     shape : tuple of int
 
     Returns

@@ -271,8 +271,8 @@ def contraction(M: Array, P: Array, P_next: Array) -> Array:
 def theorem_constants(a: Assumptions) -> tuple[float, float]:
     """lambda_min and mu_max of Theorem 1, in E[V_t] <= (1 - lambda_min) V_{t-1} + mu_max.
 
-    lambda_min = p_min (h_min beta_min f_min)^2 / (p_max (h_max beta_max f_max)^2
-                 + q_max h_max^2 + r_max),
+    lambda_min = p_min s^2 / (p_max (h_max beta_max f_max)^2 + q_max h_max^2 + r_max)
+    with s = h_min beta_min f_min,
     mu_max = (1 / p_min + h_max^4 p_max / r_min^2) q_max n + h_max^2 p_max m / r_min
 
     Parameters
