@@ -63,14 +63,16 @@ def test_summary_and_scorecard_count_and_list(ledger):
         ENTRY.format(id="word").replace('"printed"', '"ours"\nown_rule = "A test."'),
     )
     lines = repr(claims.summary()).splitlines()
-    assert (
-        lines[0] == "reproduced: {'someone1999 printed': 1, 'someone1999 ours': 1, 'this book': 0}"
-    )
-    assert lines[4:] == [
-        "established here: {'someone1999 printed': 0, 'someone1999 ours': 0, 'this book': 1}",
-        "all: {'someone1999 printed': 1, 'someone1999 ours': 1, 'this book': 1}",
+    assert [line.partition(":")[0] for line in lines] == [
+        "someone1999 printed",
+        "someone1999 ours",
+        "this book",
     ]
-    assert claims.summary()._repr_html_().count("<tr") == 8
+    assert "'reproduced': 1," in lines[0]
+    assert "'reproduced': 1," in lines[1]
+    assert "'reproduced': 0," in lines[2]
+    assert lines[2].endswith("'established here': 1, 'all': 1}")
+    assert claims.summary()._repr_html_().count("<tr") == 4
     page = claims.scorecard("someone1999")._repr_html_()
     assert '<a href="part/chapter.html#claim-ten">Fig. 1</a>' in page
     assert "claim-own" not in page

@@ -75,24 +75,24 @@ def summary() -> Page:
     Page
     """
     ledger = load().values()
-    sources = list(dict.fromkeys(_work(c) for c in ledger))
     counts = Counter((_work(c), c.threshold, c.verdict) for c in ledger)
-    columns = [(s, t) for s in sources for t in _thresholds(ledger, s)]
-    spans = Counter(source for source, _ in columns)
-    head = "".join(f'<th colspan="{spans[s]}">{_text(s)}</th>' for s in sources)
-    below = "".join(f"<th>{t or ''}</th>" for _, t in columns)
     rows, lines = [], []
-    for verdict in (*VERDICTS, "all"):
-        chosen = VERDICTS if verdict == "all" else (verdict,)
-        found = [sum(counts[*column, v] for v in chosen) for column in columns]
-        cells = "".join(f"<td>{n or '·'}</td>" for n in found)
-        rows.append(f'<tr class="claim-{_slug(verdict)}"><th>{verdict}</th>{cells}</tr>')
-        named = (f"{s} {t}" if t else s for s, t in columns)
-        lines.append(f"{verdict}: {dict(zip(named, found, strict=True))}")
-    counted = (
-        f'<table class="claims-summary"><tr><th>verdict</th>{head}</tr>'
-        f"<tr><th>limit</th>{below}</tr>{''.join(rows)}</table>"
+    for source in dict.fromkeys(_work(c) for c in ledger):
+        for threshold in _thresholds(ledger, source):
+            found = {verdict: counts[source, threshold, verdict] for verdict in VERDICTS}
+            found["all"] = sum(found.values())
+            cells = "".join(
+                f'<td class="claim-{_slug(verdict)}">{n or "·"}</td>'
+                for verdict, n in found.items()
+            )
+            rows.append(f"<tr><th>{_text(source)}</th><td>{threshold or ''}</td>{cells}</tr>")
+            lines.append(f"{source}{f' {threshold}' if threshold else ''}: {found}")
+    titles = "".join(
+        f'<th class="claim-{_slug(v)}"><span class="claim-verdict">{v}</span></th>'
+        for v in VERDICTS
     )
+    head = f"<tr><th>source</th><th>limit</th>{titles}<th>all</th></tr>"
+    counted = f'<table class="claims-summary">{head}{"".join(rows)}</table>'
     return Page(_scrolling(counted), "\n".join(lines))
 
 
