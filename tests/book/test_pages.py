@@ -53,7 +53,7 @@ CONTRAST = """theme => {
         return (high + 0.05) / (low + 0.05);
     };
     const own = e => [...e.childNodes].some(n => n.nodeType == Node.TEXT_NODE && n.data.trim());
-    const boxes = '.claim, .claims-summary, .claims-table, figcaption';
+    const boxes = '.claim, .claims-summary, .claims-table, .claims-listing, figcaption';
     return [...document.querySelectorAll(boxes)]
         .flatMap(box => [box, ...box.querySelectorAll('*')])
         .filter(e => own(e) && !e.matches('.headerlink'))

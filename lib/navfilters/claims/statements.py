@@ -107,7 +107,7 @@ def statements() -> Page:
         rows.append(f"<tr><td>{_text(work)}{listed if missing else ''}</td>{cells}</tr>")
         lines.append(f"{work}: {dict(zip(('all', *STATES), numbers, strict=True))}")
     head = ("source", "statements", *STATES)
-    return Page(table("claims-table claims-statements", head, rows), "\n".join(lines))
+    return Page(table("claims-listing", head, rows), "\n".join(lines))
 
 
 def _text(text: str) -> str:
