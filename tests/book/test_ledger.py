@@ -19,7 +19,7 @@ PATH = ROOT / "book" / "claims.toml"
 ENTRIES = tomllib.loads(PATH.read_text(encoding="utf-8"))["claim"]
 LEDGER = claims.load(PATH)
 SPREADS = json.loads(spread.STORED.read_text(encoding="utf-8"))
-PLACE = re.compile(r"\b(sections?|Eqs?\.|Figs?\.|Tables?|appendix)\s*\(?[IVXLC\dA-Z]", re.I)
+PLACE = re.compile(r"\b(sections?|Eqs?\.|Figs?\.|Tables?|appendix|Lemma)\s*\(?[IVXLC\dA-Z]", re.I)
 
 
 def chapters():
@@ -87,27 +87,38 @@ def test_its_source_is_in_the_bibliography_and_names_a_place(claim):
 # --- rules that cannot be bent ------------------------------------------------------------------
 
 
+def bindings(tree):
+    """What each name of a notebook was made from: every expression that it was given."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef):
+            yield node.name, node
+        targets = getattr(node, "targets", [getattr(node, "target", None)])
+        if isinstance(node, ast.Assign | ast.AugAssign | ast.AnnAssign | ast.For):
+            value = node.iter if isinstance(node, ast.For) else node.value
+            for name in {n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)}:
+                yield name, value or node
+
+
 def built_by(kind):
-    """Claims whose check hands over a ``Readings``, ``Parts`` or ``Some``, also by a name."""
+    """Claims whose check hands over a ``Readings``, ``Parts`` or ``Some``, by whatever name."""
     found = set()
     for _, cells in chapters():
         source = "\n".join(TransformerManager().transform_cell(cell.source) for cell in cells)
-        tree = ast.parse(source)
-        making = {
-            name
-            for node in ast.walk(tree)
-            if isinstance(node, ast.Assign | ast.FunctionDef) and f"{kind}(" in ast.unparse(node)
-            for name in (
-                [node.name]
-                if isinstance(node, ast.FunctionDef)
-                else [n.id for t in node.targets for n in ast.walk(t) if isinstance(n, ast.Name)]
-            )
-        }
+        given = list(bindings(ast.parse(source)))
+        making, before = {kind}, set()
+        while making != before:
+            before = set(making)
+            making |= {name for name, value in given if mentioned(value) & making}
         for call in check_calls(source):
-            names = {n.id for a in call.args[1:] for n in ast.walk(a) if isinstance(n, ast.Name)}
-            if kind in names or names & making:
+            if any(mentioned(argument) & making for argument in call.args[1:]):
                 found.add(call.args[0].value)
     return found
+
+
+def mentioned(node):
+    """Every name and attribute in an expression."""
+    names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
+    return names | {n.attr for n in ast.walk(node) if isinstance(n, ast.Attribute)}
 
 
 def test_nothing_is_left_to_be_said():
