@@ -71,7 +71,7 @@ nbval: $(VENV)/.test  ## run every notebook and compare with its stored outputs
 elsewhere: $(VENV)/.test  ## the same without AVX-512, and with another BLAS kernel on one thread
 	$(BIN)/python tools/nbval_elsewhere.py
 
-spread: $(VENV)/.test  ## how far each claim moves with last bits and processors: about an hour
+spread: $(VENV)/.test  ## how far each claim moves with last bits and processors: an hour and a half
 	$(BIN)/python tools/spread.py --store
 
 pages: $(VENV)/.test $(BUILT)  ## the ledger, the stored notebooks, and the built pages in a browser
