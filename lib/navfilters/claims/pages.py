@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .ledger import (
+    ESTABLISHED,
     OURS,
     PRINTED,
     SHAPE_OF_A_NUMBER,
@@ -17,6 +18,9 @@ from .ledger import (
     load,
     load_words,
 )
+
+
+OF_A_SOURCE = tuple(verdict for verdict in VERDICTS if verdict != ESTABLISHED)
 
 
 @dataclass(frozen=True)
@@ -74,26 +78,29 @@ def summary() -> Page:
     -------
     Page
     """
-    ledger = load().values()
+    ledger = [c for c in load().values() if not c.own]
+    findings = len(load()) - len(ledger)
     counts = Counter((_work(c), c.threshold, c.verdict) for c in ledger)
     rows, lines = [], []
     for source in dict.fromkeys(_work(c) for c in ledger):
         for threshold in _thresholds(ledger, source):
-            found = {verdict: counts[source, threshold, verdict] for verdict in VERDICTS}
+            found = {verdict: counts[source, threshold, verdict] for verdict in OF_A_SOURCE}
             found["all"] = sum(found.values())
             cells = "".join(
                 f'<td class="claim-{_slug(verdict)}">{n or "·"}</td>'
                 for verdict, n in found.items()
             )
-            rows.append(f"<tr><th>{_text(source)}</th><td>{threshold or ''}</td>{cells}</tr>")
-            lines.append(f"{source}{f' {threshold}' if threshold else ''}: {found}")
+            rows.append(f"<tr><th>{_text(source)}</th><td>{threshold}</td>{cells}</tr>")
+            lines.append(f"{source} {threshold}: {found}")
     titles = "".join(
         f'<th class="claim-{_slug(v)}"><span class="claim-verdict">{v}</span></th>'
-        for v in VERDICTS
+        for v in OF_A_SOURCE
     )
     head = f"<tr><th>source</th><th>limit</th>{titles}<th>all</th></tr>"
     counted = f'<table class="claims-summary">{head}{"".join(rows)}</table>'
-    return Page(_scrolling(counted), "\n".join(lines))
+    own = f"{ESTABLISHED}, as findings of this book's own: {findings}"
+    note = f'<div class="claim-{_slug(ESTABLISHED)}"><span class="claim-verdict">{own}</span></div>'
+    return Page(_scrolling(counted) + note, "\n".join([*lines, own]))
 
 
 def scorecard(work: str) -> Page:
@@ -170,9 +177,9 @@ def _at(claim: Claim) -> str:
     return f"{claim.id} ({plain(claim.paper_value)})"
 
 
-def _thresholds(ledger, source: str) -> Sequence[str | None]:
+def _thresholds(ledger: Sequence[Claim], source: str) -> list[str]:
     found = {c.threshold for c in ledger if _work(c) == source}
-    return [t for t in (PRINTED, OURS, None) if t in found]
+    return [t for t in (PRINTED, OURS) if t in found]
 
 
 def _side(claim: Claim) -> str:
