@@ -19,7 +19,6 @@ from .ledger import (
     load_words,
 )
 
-
 OF_A_SOURCE = tuple(verdict for verdict in VERDICTS if verdict != ESTABLISHED)
 
 
