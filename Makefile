@@ -59,10 +59,11 @@ unit: $(VENV)/.test  ## unit and property tests alone, without the slow ones, in
 coverage: $(VENV)/.test  ## all unit tests, with branch coverage
 	$(BIN)/pytest tests --ignore tests/book -n 2 --cov --cov-report=term
 
-lint: $(VENV)/.test  ## ruff over code and notebooks, mypy over the library
+lint: $(VENV)/.test  ## ruff over code and notebooks, mypy and the layers of imports over the library
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/lint-imports
 
 nbval: $(VENV)/.test  ## run every notebook and compare with its stored outputs
 	PYTHONPATH="$(CURDIR)/tools" $(BIN)/pytest book --nbval --nbval-current-env -n 2 --dist loadscope \
@@ -90,7 +91,7 @@ bench: $(BENCH)/.ready $(VENV)/.book  ## measure beside the peers and a C loop; 
 	env -u OPENBLAS_CORETYPE $(BIN)/python benchmarks/imaging.py
 
 campaign: $(VENV)/.book  ## the closed loop at the paper's size; stopped, it goes on where it was
-	$(BIN)/python -m navfilters.experiments.sar_campaign --folder campaign
+	$(BIN)/python -m navfilters.papers.pogorelsky2020 --campaign campaign
 
 lock:  ## refresh the three requirements.txt from their .in lists
 	$(PYTHON) -m venv _build/lock

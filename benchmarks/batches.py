@@ -21,8 +21,8 @@ import jax
 import numpy as np
 
 from navfilters import FILTERS, Gaussian, sweep
-from navfilters.experiments import sar_trn, xiong2009
 from navfilters.models import Linear
+from navfilters.papers import pogorelsky2020, xiong2009
 
 REPEATS = 5
 RESULTS = Path(__file__).with_name("batches.json")
@@ -35,7 +35,7 @@ def orbit(runs: range) -> np.ndarray:
 
 def images(runs: range) -> np.ndarray:
     """The multiplicative EKF on radar images: 72 updates, 10 steps between them."""
-    return sar_trn.monte_carlo("TC-1", runs=list(runs)).errors[:, -1]
+    return pogorelsky2020.monte_carlo("TC-1", runs=list(runs)).errors[:, -1]
 
 
 CONTESTS = {

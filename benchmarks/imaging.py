@@ -37,11 +37,12 @@ if hasattr(os, "sched_setaffinity"):
 import numpy as np
 from scipy import fft
 
-from navfilters.experiments.sar_images import Imaging, acquire
-from navfilters.experiments.sar_trn import CASES
-from navfilters.sar.autofocus import sharpness
-from navfilters.sar.echo import PALSAR, Raw
-from navfilters.sar.focus import Focuser
+from navfilters.papers.pogorelsky2020.acquisition import acquire
+from navfilters.papers.pogorelsky2020.experiment import CASES
+from navfilters.papers.pogorelsky2020.imaging import Imaging
+from navfilters.sar.images.autofocusing import sharpness
+from navfilters.sar.images.focuser import Focuser
+from navfilters.sar.raw.radar import PALSAR, Raw
 
 REPEATS = 15
 PULSES, RANGES = 9342, 1908

@@ -11,7 +11,7 @@ import numpy as np
 from problems import Coasting, Images
 
 from navfilters import Gaussian
-from navfilters.models.gravity import Gravity
+from navfilters.space.gravity import Gravity
 
 SOURCES = sorted(Path(__file__).parent.glob("limit*.c"))
 FLAGS = ("-O3", "-shared", "-fPIC")

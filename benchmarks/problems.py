@@ -14,16 +14,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from navfilters import Gaussian, sweep
-from navfilters.attitude import from_rotation_vector, normalized, product, rotation_vector
-from navfilters.experiments import sar_trn, xiong2009
-from navfilters.experiments.sar_trn import NOMINAL
-from navfilters.frames import ellipsoid_intersection
-from navfilters.models.earth_fixed import EarthFixedOrbit, runge_kutta
-from navfilters.models.orbit import Orbit
-from navfilters.models.sar_geometry import Measurement, SarGeometry
-from navfilters.models.star_earth_sensor import StarEarthSensor
-from navfilters.multiplicative import MekfState, mekf_update
-from navfilters.robust import ExtendedKalman
+from navfilters.estimators.extended import ExtendedKalman
+from navfilters.estimators.multiplicative import MekfState, mekf_update
+from navfilters.numerics.runge_kutta import runge_kutta
+from navfilters.papers import pogorelsky2020, xiong2009
+from navfilters.papers.pogorelsky2020.experiment import NOMINAL
+from navfilters.space.earth_fixed_orbit import EarthFixedOrbit
+from navfilters.space.frames import ellipsoid_intersection
+from navfilters.space.image_measurement import Measurement, SarGeometry
+from navfilters.space.inertial_orbit import Orbit
+from navfilters.space.quaternions import from_rotation_vector, normalized, product, rotation_vector
+from navfilters.space.star_earth_sensor import StarEarthSensor
 from navfilters.types import Array
 
 LONGEST = 90
@@ -262,8 +263,8 @@ def coasting() -> Coasting:
 
 def images() -> Images:
     """Test case 2 of pogorelsky2020, which is not underweighted."""
-    setup = sar_trn.CASES["TC-2"]
-    flight = sar_trn.truth(setup, LONGEST)
+    setup = pogorelsky2020.CASES["TC-2"]
+    flight = pogorelsky2020.truth(setup, LONGEST)
     geometry = replace(setup.geometry, T_e_b=flight.T_e_b[0])
     spread = setup.orbit.propagate(flight.x[0], np.zeros((9, 9)), setup.steps)[1]
     first = Gaussian(np.concatenate([flight.x[0], np.zeros(3)]), setup.P0)

@@ -35,7 +35,7 @@ import peers_moving
 import problems
 
 from navfilters import Gaussian
-from navfilters.experiments.perea2007 import Setup
+from navfilters.papers.perea2007.experiment import Setup
 
 BATCHES = (1, 100, 10_000, 100_000)
 RESULTS = Path(__file__).with_name("results.json")

@@ -10,7 +10,7 @@ from mpmath import mp, mpf
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from navfilters.attitude import (
+from navfilters.space.quaternions import (
     conjugate,
     cross_matrix,
     from_rotation_vector,

@@ -11,8 +11,8 @@ from naive import covariances
 from numpy.testing import assert_allclose
 
 from navfilters import FILTERS, Gaussian, sweep
-from navfilters.experiments.perea2007 import Setup
-from navfilters.experiments.sar_trn import NOMINAL
+from navfilters.papers.perea2007.experiment import Setup
+from navfilters.papers.pogorelsky2020.experiment import NOMINAL
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 BASE = Setup()

@@ -10,7 +10,7 @@ from naive import covariances
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import stats
 
-from navfilters.consistency import (
+from navfilters.runs.consistency import (
     chi_square_band,
     coverage,
     mean_nees,

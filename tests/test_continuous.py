@@ -12,13 +12,8 @@ from scipy.integrate import RK45, solve_ivp
 from scipy.linalg import solve_continuous_are
 
 from navfilters import Gaussian
-from navfilters.continuous import (
-    ContinuousSystem,
-    Reference,
-    extended_kalman_bucy,
-    linearized_kalman_bucy,
-    reference_residual,
-)
+from navfilters.estimators.continuous import extended_kalman_bucy, linearized_kalman_bucy
+from navfilters.estimators.continuous_system import ContinuousSystem, Reference, reference_residual
 
 jax.config.update("jax_enable_x64", True)
 

@@ -9,7 +9,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from navfilters import Gaussian
-from navfilters.derivatives import around, check_model, complex_step, examine, jacobian
+from navfilters.numerics.complex_step import complex_step
+from navfilters.numerics.jacobians import around, check_model, examine, jacobian
 
 jax.config.update("jax_enable_x64", True)
 

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import block_diag, solve_discrete_are
 
 from navfilters import Gaussian, kalman_update, linearized
-from navfilters.discrete import DiscreteSystem, extended_kalman_filter, predict, update
+from navfilters.estimators.discrete import DiscreteSystem, extended_kalman_filter, predict, update
 from navfilters.models import RangeBearing
 
 # Three states, two inputs, two process noises, three measurement noises in two measurements.

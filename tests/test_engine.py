@@ -9,8 +9,8 @@ from naive import covariances
 from numpy.testing import assert_allclose, assert_array_equal
 
 from navfilters import FILTERS, Gaussian, SigmaPoints, first_indefinite, run
-from navfilters.experiments.perea2007 import Setup, isotropic
 from navfilters.models import Linear, RangeBearing
+from navfilters.papers.perea2007.experiment import Setup, isotropic
 
 BASE = Setup()
 MODEL = BASE.model

@@ -8,7 +8,7 @@ import scipy.linalg
 from filterpy.kalman import ExtendedKalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
 
 from navfilters import FILTERS, SigmaPoints, run
-from navfilters.experiments.perea2007 import Setup, position_error
+from navfilters.papers.perea2007.experiment import Setup, position_error
 
 SETUPS = {
     "baseline": Setup(),

@@ -12,7 +12,17 @@ from hypothesis import strategies as st
 from naive import covariances, each, quadratic
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters import FILTERS, Gaussian, Moments, SigmaPoints, filters, kalman_update, run
+from navfilters import FILTERS, Gaussian, Moments, SigmaPoints, kalman_update, run
+from navfilters.estimators.filter import _keywords
+from navfilters.estimators.variants import (
+    bump_circular,
+    bump_equivalent,
+    bump_linear,
+    bump_predicted,
+    bump_state,
+    expect_at_mean,
+    unchanged,
+)
 from navfilters.models import Linear, RangeBearing
 
 # Every option of every filter, at every value that the tests run.
@@ -200,12 +210,12 @@ def expected_at_mean(model, x, P, moments):
 
 
 VARIANTS = {
-    "unchanged": (filters.unchanged, lambda model, x, P, moments: moments),
-    "bump_linear, Eq. (14)": (filters.bump_linear, noise_bumped),
-    "bump_circular, Eq. (15)": (filters.bump_circular, noise_circular),
-    "bump_equivalent, Eq. (16)": (filters.bump_equivalent, noise_equivalent),
-    "bump_predicted, VI.A.1": (filters.bump_predicted, noise_predicted),
-    "expect_at_mean, VI.A.2": (filters.expect_at_mean, expected_at_mean),
+    "unchanged": (unchanged, lambda model, x, P, moments: moments),
+    "bump_linear, Eq. (14)": (bump_linear, noise_bumped),
+    "bump_circular, Eq. (15)": (bump_circular, noise_circular),
+    "bump_equivalent, Eq. (16)": (bump_equivalent, noise_equivalent),
+    "bump_predicted, VI.A.1": (bump_predicted, noise_predicted),
+    "expect_at_mean, VI.A.2": (expect_at_mean, expected_at_mean),
 }
 
 
@@ -224,7 +234,7 @@ def test_a_variant_is_its_printed_equation(variant, plain):
     """Given any moments with P_xz = P H^T it changes what the equation names, and only that."""
     prior, _, model = nonlinear()
     z_hat, P_zz, P_xz = each(naive.second_order, *prior, model)
-    for bump in [{}] if "bump" not in filters._keywords(variant) else [{}, *bumps()]:
+    for bump in [{}] if "bump" not in _keywords(variant) else [{}, *bumps()]:
         same, got = variant(prior, model, Moments(z_hat, P_zz, P_xz), **bump)
         assert same is prior
         for i, (x, P) in enumerate(zip(*prior, strict=True)):
@@ -241,7 +251,7 @@ def test_bump_state_is_eq_17():
     """P_new = |P| I, with the moments that belong to it; only z_hat survives."""
     prior, _, model = nonlinear()
     z_hat, P_zz, P_xz = each(naive.second_order, *prior, model)
-    changed, got = filters.bump_state(prior, model, Moments(z_hat, P_zz, P_xz))
+    changed, got = bump_state(prior, model, Moments(z_hat, P_zz, P_xz))
     assert_array_equal(changed.mean, prior.mean)
     for i, (x, P) in enumerate(zip(*prior, strict=True)):
         H, P_new = model.jacobian(x), norm(P) * np.eye(2)

@@ -48,7 +48,7 @@ def checkout(tmp_path, request):
     shutil.copy(ROOT / "Makefile", folder)
     for name in ("pyproject.toml", "requirements.txt", "requirements-test.txt", "_toc.yml"):
         (folder / name).touch()
-    for name in ("python", "pytest", "pip", "ruff", "mypy", "jupyter-book"):
+    for name in ("python", "pytest", "pip", "ruff", "mypy", "lint-imports", "jupyter-book"):
         script(folder / ".venv/bin" / name, SAYS)
     for name in (".venv/.book", ".venv/.test"):
         (folder / name).touch()
@@ -339,10 +339,11 @@ def test_every_module_is_imported_or_says_what_it_needs():
         """)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == [
+        "navfilters.book.plotting | plotting needs matplotlib: pip install navfilters[book]",
         "navfilters.oracles.perea2007 | this oracle needs mpmath: pip install navfilters[book]",
         "navfilters.oracles.sar_trn | this oracle needs mpmath: pip install navfilters[book]",
-        "navfilters.plotting | plotting needs matplotlib: pip install navfilters[book]",
-        'navfilters.sweeping.compiled | engine="jax" needs JAX: pip install navfilters[jax]',
+        "navfilters.oracles.two_by_two | this oracle needs mpmath: pip install navfilters[book]",
+        'navfilters.runs.compiled | engine="jax" needs JAX: pip install navfilters[jax]',
     ]
 
 
@@ -363,20 +364,21 @@ def test_a_sweep_needs_no_extra(options):
             "a sweep on a cluster needs dask: pip install navfilters[cluster]",
         ),
         (
-            "from navfilters.sar.scene import sample_terrain; sample_terrain(0, 0)",
+            "from navfilters.sar.ground.terrain import sample_terrain; sample_terrain(0, 0)",
             "the sample terrain needs matplotlib: pip install navfilters[sar]",
         ),
         (
-            "from navfilters.frames import ecef_to_geodetic; ecef_to_geodetic([7e6, 0, 0])",
+            "from navfilters.space.frames import ecef_to_geodetic; ecef_to_geodetic([7e6, 0, 0])",
             "geodetic arithmetic needs pymap3d: pip install navfilters[sar]",
         ),
         (
-            "from navfilters.sar.geolocate import MATCHER; MATCHER.features(np.eye(9))",
+            "from navfilters.sar.matching.matcher import MATCHER; MATCHER.features(np.eye(9))",
             "geolocation needs OpenCV: pip install navfilters[sar]",
         ),
         (
-            "from navfilters.sar import geotiff, scene\n"
-            "geotiff.read_terrain('a.tif', scene.LocalMap(0, 0), 9.0)",
+            "from navfilters.sar.ground import LocalMap\n"
+            "from navfilters.sar.palsar import read_terrain\n"
+            "read_terrain('a.tif', LocalMap(0, 0), 9.0)",
             "a GeoTIFF file needs rasterio: pip install navfilters[palsar]",
         ),
     ],
@@ -388,13 +390,12 @@ def test_what_needs_an_extra_says_which(call, line):
 
 
 COMMANDS = {
-    "experiments.divergence_maps": "a picture of the maps needs matplotlib: pip install "
-    "navfilters[book]",
-    "experiments.sar_trn": "geodetic arithmetic needs pymap3d: pip install navfilters[sar]",
-    "experiments.sar_trn --closed-loop": "geodetic arithmetic needs pymap3d: pip install "
+    "papers.perea2007": "a picture of the maps needs matplotlib: pip install navfilters[book]",
+    "papers.pogorelsky2020": "geodetic arithmetic needs pymap3d: pip install navfilters[sar]",
+    "papers.pogorelsky2020 --closed-loop": "geodetic arithmetic needs pymap3d: pip install "
     "navfilters[sar]",
-    "experiments.sar_closed_loop": "geodetic arithmetic needs pymap3d: pip install navfilters[sar]",
-    "experiments.sar_campaign": "geodetic arithmetic needs pymap3d: pip install navfilters[sar]",
+    "papers.pogorelsky2020 --campaign there": "geodetic arithmetic needs pymap3d: pip install "
+    "navfilters[sar]",
 }
 RUN = """
 import runpy
@@ -415,7 +416,7 @@ def test_a_command_without_its_extra_ends_with_one_line(command, tmp_path, monke
 
 @pytest.mark.slow
 def test_commands_that_need_no_extra(tmp_path):
-    done = bare(RUN, "navfilters.experiments.xiong2009", "--seeds", "1")
+    done = bare(RUN, "navfilters.papers.xiong2009", "--seeds", "1")
     assert done.returncode == 0, done.stderr
     assert "paper" in done.stdout
     done = bare(RUN, "navfilters.sar.palsar", str(tmp_path / "none"))
@@ -428,7 +429,7 @@ def test_an_extra_that_is_broken_is_not_called_missing(tmp_path):
     (tmp_path / "cv2.py").write_text("raise ImportError('libGL.so.1: cannot open shared object')")
     done = subprocess.run(
         [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
-         "import numpy as np\nfrom navfilters.sar.geolocate import MATCHER\n"
+         "import numpy as np\nfrom navfilters.sar.matching.matcher import MATCHER\n"
          "MATCHER.features(np.eye(9))"],
         capture_output=True, text=True, check=False,
     )  # fmt: skip

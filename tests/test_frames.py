@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters.frames import (
+from navfilters.space.frames import (
     FLATTENING,
     SEMI_MAJOR,
     antenna_axes,

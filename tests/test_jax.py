@@ -122,7 +122,7 @@ def test_derivatives_by_jax_are_the_models():
 
 
 @pytest.mark.parametrize(
-    "module", ["navfilters", "navfilters.models", "navfilters.experiments.perea2007"]
+    "module", ["navfilters", "navfilters.models", "navfilters.papers.perea2007.experiment"]
 )
 def test_import_needs_numpy_only(module):
     """In a fresh interpreter: neither JAX nor what only the book or the oracle needs."""

@@ -9,17 +9,15 @@ from hypothesis.extra.numpy import arrays
 from naive import covariances
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters.linalg import (
+from navfilters.numerics.matrix_roots import keep_exact, semidefinite_root, symmetric_root
+from navfilters.numerics.small_matrices import (
     cholesky,
     is_positive_definite,
-    keep_exact,
     matmul,
     matrix,
     outer_sum,
     right_divide,
-    semidefinite_root,
     spectral_norm,
-    symmetric_root,
     vector,
 )
 

@@ -12,7 +12,7 @@ FAULTS = """
 import resource
 import numpy as np
 from navfilters import FILTERS, Gaussian, run, sweep
-from navfilters.experiments.perea2007 import Setup
+from navfilters.papers.perea2007 import Setup
 
 base, many = Setup(), 10_000
 priors = Gaussian(np.tile(base.x0, (many, 1)), np.tile(base.prior.cov, (many, 1, 1)))

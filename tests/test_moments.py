@@ -12,8 +12,9 @@ from naive import covariances, each, quadratic
 from numpy.testing import assert_allclose, assert_array_equal
 
 from navfilters import Gaussian, Moments, SigmaPoints, linearized, second_order, unscented
+from navfilters.estimators.moments import second_order_bias
+from navfilters.estimators.sigma_points import sigma_points
 from navfilters.models import Linear, RangeBearing
-from navfilters.moments import second_order_bias, sigma_points
 
 ALPHAS = [1e-3, 0.1, 1.0, 2.0]
 BETAS = [0.0, 2.0, 3.0]

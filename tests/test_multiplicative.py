@@ -14,10 +14,10 @@ from naive import covariances, kalman
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from navfilters.attitude import conjugate, from_rotation_vector, product, rotation_vector
-from navfilters.frames import body_axes, ellipsoid_intersection, enu_covariance
-from navfilters.models.sar_geometry import Measurement, SarGeometry
-from navfilters.multiplicative import MekfState, mekf_update
+from navfilters.estimators.multiplicative import MekfState, mekf_update
+from navfilters.space.frames import body_axes, ellipsoid_intersection, enu_covariance
+from navfilters.space.image_measurement import Measurement, SarGeometry
+from navfilters.space.quaternions import conjugate, from_rotation_vector, product, rotation_vector
 
 jax.config.update("jax_enable_x64", True)
 

@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters import FILTERS, Gaussian, SigmaPoints, run, sweep, validation
-from navfilters.consistency import chi_square_band, coverage
-from navfilters.continuous import ContinuousSystem, extended_kalman_bucy
+from navfilters import FILTERS, Gaussian, SigmaPoints, run, sweep
+from navfilters.estimators.adaptive import AdaptiveEKF
+from navfilters.estimators.continuous import extended_kalman_bucy
+from navfilters.estimators.continuous_system import ContinuousSystem
+from navfilters.estimators.robust import AdaptiveRobustEKF, RobustEKF
 from navfilters.models import RangeBearing
-from navfilters.models.earth_fixed import EarthFixedOrbit
-from navfilters.models.orbit import Orbit
-from navfilters.robust import AdaptiveEKF, AdaptiveRobustEKF, RobustEKF
+from navfilters.numerics import validation
+from navfilters.runs.consistency import chi_square_band, coverage
+from navfilters.space.earth_fixed_orbit import EarthFixedOrbit
+from navfilters.space.inertial_orbit import Orbit
 
 MODEL = RangeBearing(np.diag([0.04, 1e-4]))
 PRIORS = Gaussian(np.array([[28.0, 41.0], [31.0, 38.0], [33.0, 42.0]]), 4 * np.eye(2))

@@ -9,9 +9,11 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from navfilters import FILTERS, SigmaPoints, first_indefinite, run
-from navfilters.experiments.perea2007 import Setup, isotropic, position_error
 from navfilters.models import RangeBearing
 from navfilters.oracles import perea2007 as oracle
+from navfilters.oracles import two_by_two
+from navfilters.oracles.two_by_two import is_positive_definite
+from navfilters.papers.perea2007 import Setup, isotropic, position_error
 
 STEPS = [1, 2, 10, 100, 1000]
 SETUPS = {
@@ -116,7 +118,7 @@ def test_second_order_filters(name, setup):
     the ends of their distribution). The width itself may not exceed a tenth of the value.
     """
     entries = exact(name, setup, keep=range(1001))
-    definite = [oracle._is_positive_definite(p) for _, _, p in entries]
+    definite = [is_positive_definite(p) for _, _, p in entries]
     lost = definite.index(False) if False in definite else 1001
     got = run(FILTERS[name], setup.prior, setup.z, setup.model)
     assert first_indefinite(got.cov) == (lost if lost <= 1000 else -1)
@@ -152,11 +154,16 @@ def test_where_the_setups_lose_definiteness():
 
 def test_the_oracle_is_independent():
     """It imports mpmath and nothing else: not one line of the package."""
-    tree = ast.parse(inspect.getsource(oracle))
-    imports = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
-    assert [node.module for node in imports] == ["mpmath"]
-    assert all(node.level == 0 for node in imports)
-    names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    names = set()
+    for module, wanted in (
+        (oracle, ["mpmath", "navfilters.oracles.two_by_two"]),
+        (two_by_two, ["mpmath"]),
+    ):
+        tree = ast.parse(inspect.getsource(module))
+        imports = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+        assert sorted(node.module for node in imports) == wanted
+        assert all(node.level == 0 for node in imports)
+        names |= {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
     assert not names & {"__import__", "importlib", "navfilters", "np", "numpy", "eval", "exec"}
 
 

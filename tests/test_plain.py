@@ -8,22 +8,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from navfilters import (
-    FILTERS,
-    Gaussian,
-    SigmaPoints,
-    first_indefinite,
-    run,
-    sweep,
-    validation,
-)
-from navfilters.consistency import mean_nees, nees
-from navfilters.continuous import ContinuousSystem, extended_kalman_bucy
-from navfilters.discrete import DiscreteSystem, extended_kalman_filter, predict, update
-from navfilters.filters import kalman_update
+from navfilters import FILTERS, Gaussian, SigmaPoints, first_indefinite, run, sweep
+from navfilters.estimators.adaptive import AdaptiveEKF
+from navfilters.estimators.continuous import extended_kalman_bucy
+from navfilters.estimators.continuous_system import ContinuousSystem
+from navfilters.estimators.discrete import DiscreteSystem, extended_kalman_filter, predict, update
+from navfilters.estimators.extended import ExtendedKalman
+from navfilters.estimators.moments import linearized
+from navfilters.estimators.robust import AdaptiveRobustEKF, RobustEKF
+from navfilters.estimators.update import kalman_update
 from navfilters.models import Linear, RangeBearing
-from navfilters.moments import linearized
-from navfilters.robust import AdaptiveEKF, AdaptiveRobustEKF, ExtendedKalman, RobustEKF
+from navfilters.numerics import validation
+from navfilters.runs.consistency import mean_nees, nees
 
 MEAN, COV, Z, R = np.array([28.0, 41.0]), 4 * np.eye(2), np.array([50.2, 0.92]), 0.01 * np.eye(2)
 MODEL = RangeBearing(R)

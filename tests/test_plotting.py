@@ -10,8 +10,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
-from navfilters import FILTERS, plotting
-from navfilters.plotting import STYLES
+from navfilters import FILTERS
+from navfilters.book import plotting
+from navfilters.book.plotting.styles import STYLES
 
 
 @pytest.fixture

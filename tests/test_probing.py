@@ -12,9 +12,9 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from navfilters import FILTERS, Gaussian, run, sweep
-from navfilters.model_checks import dynamics, sensor
 from navfilters.models import Linear, RangeBearing
-from navfilters.probing import members, probe
+from navfilters.numerics.probing import members, probe
+from navfilters.runs.model_checks import dynamics, sensor
 
 RIGHT = RangeBearing(np.diag([0.04, 1e-4]))
 Z = np.array([50.2, 0.92])

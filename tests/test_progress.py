@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from navfilters._progress import bar, progress
+from navfilters.runs.progress import bar, progress
 
 
 @pytest.fixture

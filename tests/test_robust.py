@@ -12,16 +12,12 @@ import scipy.linalg
 from naive import covariances, kalman, quadratic
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters import Gaussian, bounds
+from navfilters import Gaussian
+from navfilters.estimators.adaptive import AdaptiveEKF, _expm
+from navfilters.estimators.extended import ExtendedKalman
+from navfilters.estimators.robust import AdaptiveRobustEKF, RobustEKF, trace_ratio
 from navfilters.models import Linear
-from navfilters.robust import (
-    AdaptiveEKF,
-    AdaptiveRobustEKF,
-    ExtendedKalman,
-    RobustEKF,
-    _expm,
-    trace_ratio,
-)
+from navfilters.papers import xiong2009
 
 inv = np.linalg.inv
 jax.config.update("jax_enable_x64", True)
@@ -501,7 +497,7 @@ TIMES = np.arange(61)
 class Run:
     """A run of the REKF on a system that meets Eq. (15) with a known beta; rank H = n = 2."""
 
-    a: bounds.Assumptions
+    a: xiong2009.Assumptions
     rate: np.ndarray  # by which V contracts, at every step
     error: np.ndarray  # mean square, at every time
     P: np.ndarray  # predicted
@@ -514,7 +510,7 @@ class Run:
         return np.linalg.eigvalsh(self.Sigma - self.Sigma_bar)[:, 0] > 0
 
     def bound(self, **options):
-        return bounds.theorem_bound(self.a, self.error[0], TIMES, **options)
+        return xiong2009.theorem_bound(self.a, self.error[0], TIMES, **options)
 
 
 def theory(growth, beta, gamma=np.inf, lam=None, unit=1.0, members=2000):
@@ -541,13 +537,15 @@ def theory(growth, beta, gamma=np.inf, lam=None, unit=1.0, members=2000):
     F, cov = inv(beta) @ G, np.array(cov)
     P = F @ cov[:-1] @ F.T + w
     Sigma = inv(inv(P) - np.eye(2) / (gamma * unit) ** 2) if lam is None else lam * P
-    a = bounds.assumptions(F, beta, H, cov, R, w)
+    a = xiong2009.assumptions(F, beta, H, cov, R, w)
     K = Sigma @ H.T @ inv(H @ Sigma @ H.T + R)
-    rate = bounds.contraction((np.eye(2) - K @ H) @ G, cov[:-1], cov[1:])
+    rate = xiong2009.contraction((np.eye(2) - K @ H) @ G, cov[:-1], cov[1:])
     seen = np.linalg.cholesky(cov[:-1]).mT @ G.T @ H.T
     least = np.linalg.eigvalsh(seen @ inv(H @ Sigma @ H.T + R) @ seen.mT)[:, 0]
     mean_square = np.mean(np.sum(np.square(error), axis=-1), axis=-1)
-    return Run(a, rate, mean_square, P, Sigma, bounds.real_covariance(F, beta, cov[:-1], w), least)
+    return Run(
+        a, rate, mean_square, P, Sigma, xiong2009.real_covariance(F, beta, cov[:-1], w), least
+    )
 
 
 MILD = (1.0, (1.2, 1.1))  # the Jacobian is 10 to 20 % too small, the system marginally stable
@@ -557,10 +555,10 @@ WILD = (1.3, (4.0, 4.0))  # it is a quarter of the truth, and the system unstabl
 @pytest.mark.parametrize(("system", "gamma"), [(MILD, 1.2), (WILD, 0.575)])
 def test_theorem_1_bounds_the_error_where_its_assumptions_hold(system, gamma):
     run = theory(*system, gamma)
-    lower, upper = bounds.gamma_limits(run.P, run.Sigma_bar)
+    lower, upper = xiong2009.gamma_limits(run.P, run.Sigma_bar)
     assert run.condition_19.all()
     assert ((lower < gamma) & (upper > gamma)).all()
-    lam, mu = bounds.theorem_constants(run.a)
+    lam, mu = xiong2009.theorem_constants(run.a)
     assert 0 < lam <= run.rate.min() < 1
     assert mu > 0
     assert (run.error < run.bound()).all()
@@ -577,7 +575,7 @@ def test_theorem_2_bounds_the_error_where_lambda_satisfies_25():
     P_y, P_y_bar = (H @ A @ H.T + R for A in (run.P, run.Sigma_bar))
     assert (np.linalg.eigvalsh(P_y - P_y_bar) < 0).any(axis=-1).all()
     assert run.condition_19.all()
-    needed = bounds.smallest_lambda(run.P, run.Sigma_bar)
+    needed = xiong2009.smallest_lambda(run.P, run.Sigma_bar)
     assert (needed < 16).all()
     assert (trace_ratio(P_y_bar, P_y) < needed).all()
     assert (run.error < run.bound()).all()
@@ -586,7 +584,7 @@ def test_theorem_2_bounds_the_error_where_lambda_satisfies_25():
 def test_the_same_system_under_the_ekf_violates_19_and_exceeds_the_bound():
     """gamma at infinity: the gain is too small to hold the unstable system."""
     run = theory(*WILD, np.inf)
-    _, upper = bounds.gamma_limits(run.P, run.Sigma_bar)
+    _, upper = xiong2009.gamma_limits(run.P, run.Sigma_bar)
     assert not run.condition_19.any()
     assert (upper < np.inf).all()
     assert run.error[-1] > 3 * run.bound()[-1]
@@ -598,7 +596,7 @@ def test_the_limits_of_gamma_are_those_of_the_two_inequalities():
     rng = np.random.default_rng(3)
     P, Sigma_bar = covariances(rng, (200,), 3), covariances(rng, (200,), 3)
     Sigma_bar[0] = P[0] / 2
-    lower, upper = bounds.gamma_limits(P, Sigma_bar)
+    lower, upper = xiong2009.gamma_limits(P, Sigma_bar)
     assert_allclose(lower, np.sqrt(np.linalg.eigvalsh(P)[:, -1]))
     assert upper[0] == np.inf
     open_ = np.isfinite(upper) & (upper > lower * 1.001)
@@ -613,15 +611,15 @@ def test_the_limits_of_gamma_are_those_of_the_two_inequalities():
 def test_one_gamma_cannot_serve_two_units():
     """Metres and metres per second: a velocity wrong by 2 leaves no gamma, but lambda = 4."""
     P, Sigma_bar = np.diag([1e6, 1e-2]), np.diag([1e6, 4e-2])
-    lower, upper = bounds.gamma_limits(P, Sigma_bar)
+    lower, upper = xiong2009.gamma_limits(P, Sigma_bar)
     assert_allclose([lower, upper], [1e3, 75**-0.5])
-    assert_allclose(bounds.smallest_lambda(P, Sigma_bar), 4.0)
+    assert_allclose(xiong2009.smallest_lambda(P, Sigma_bar), 4.0)
 
 
 def test_the_smallest_lambda_is_that_of_25():
     rng = np.random.default_rng(4)
     P, Sigma_bar = covariances(rng, (50,), 4), covariances(rng, (50,), 4)
-    lam = bounds.smallest_lambda(P, Sigma_bar)[:, None, None]
+    lam = xiong2009.smallest_lambda(P, Sigma_bar)[:, None, None]
     least = [np.linalg.eigvalsh(f * lam * P - Sigma_bar)[:, 0] for f in (1 - 1e-9, 1 + 1e-9)]
     assert (least[0] < 0).all()
     assert (least[1] > 0).all()
@@ -633,7 +631,7 @@ def test_the_trace_ratio_never_satisfies_25_where_it_asks_for_something():
     P, Sigma_bar = covariances(rng, (5000,), 3), covariances(rng, (5000,), 3)
     H, R = rng.normal(size=(5000, 3, 3)), 0.1 * covariances(rng, (5000,), 3)
     lam = trace_ratio(H @ Sigma_bar @ H.mT + R, H @ P @ H.mT + R)
-    needed = bounds.smallest_lambda(P, Sigma_bar)
+    needed = xiong2009.smallest_lambda(P, Sigma_bar)
     asked = needed > 1
     assert asked.sum() > 4000
     assert (lam < needed)[asked].all()
@@ -645,8 +643,8 @@ def test_the_printed_bounds_are_not_bounds():
     V = start  # V = xi^2 with E[V_t | xi] = (1 - lam) V + mu
     for t in range(1, 30):
         V = (1 - lam) * V + mu
-        assert_allclose(bounds.lemma_bound(1, 1, mu, lam, start, t), V)
-        assert bounds.lemma_bound(1, 1, mu, lam, start, t, as_printed=True) < V
+        assert_allclose(xiong2009.lemma_bound(1, 1, mu, lam, start, t), V)
+        assert xiong2009.lemma_bound(1, 1, mu, lam, start, t, as_printed=True) < V
     fine, coarse = theory(*MILD, 1.2), theory(*MILD, 1.2, unit=100.0)
     assert_allclose(coarse.error, 1e4 * fine.error, rtol=1e-9)
     assert_allclose(coarse.bound(), 1e4 * fine.bound(), rtol=1e-9)
@@ -659,7 +657,7 @@ def test_a14_is_a_rate_of_v_though_it_is_not_below_every_lambda_t():
     """Near the limit (23) lambda_t of (A.11) all but vanishes, and V contracts as (A.14) says."""
     tight = theory(*MILD, 1.01314)
     assert tight.condition_19.all()
-    lam, _ = bounds.theorem_constants(tight.a)
+    lam, _ = xiong2009.theorem_constants(tight.a)
     assert tight.lam.min() < 1e-3 * lam
     assert lam <= tight.rate.min() < 1
 
@@ -671,34 +669,34 @@ def test_a14_is_a_rate_of_v_on_random_systems(n):
     P, R, noise, more = (covariances(rng, (300,), n) for _ in range(4))
     F, H = rng.normal(size=(2, 300, n, n))
     beta = np.exp(rng.normal(size=(300, n)))[..., None] * np.eye(n)
-    Sigma = bounds.real_covariance(F, beta, P, noise) + more
+    Sigma = xiong2009.real_covariance(F, beta, P, noise) + more
     P_next = inv(inv(Sigma) + H.mT @ inv(R) @ H)
     M = P_next @ inv(Sigma) @ beta @ F
-    rate = bounds.contraction(M, P, P_next)
+    rate = xiong2009.contraction(M, P, P_next)
     directly = [
         1 - scipy.linalg.eigh(M.T @ inv(B) @ M, inv(A))[0][-1]
         for M, A, B in zip(M, P, P_next, strict=True)
     ]
     assert_allclose(rate, directly, rtol=1e-6, atol=1e-9)
     for k in range(300):
-        a = bounds.assumptions(F[k], beta[k], H[k], P[k], R[k], noise[k])
-        assert bounds.theorem_constants(a)[0] <= rate[k]
+        a = xiong2009.assumptions(F[k], beta[k], H[k], P[k], R[k], noise[k])
+        assert xiong2009.theorem_constants(a)[0] <= rate[k]
 
 
 def test_the_lemma_without_contraction_grows_for_ever():
     t = np.arange(5)
-    assert_allclose(bounds.lemma_bound(1, 2, 3, 0.0, 1.0, t), 2 + 3 * t)
-    assert_allclose(bounds.lemma_bound(1, 2, 3, 1e-9, 1.0, t), 2 + 3 * t, rtol=1e-6)
-    assert_allclose(bounds.lemma_bound(1, 2, 3, 0.0, 1.0, t, as_printed=True)[1:], 3 * t[1:] - 1)
-    assert_allclose(bounds.lemma_bound(1, 2, 3, 1.0, 1.0, t), [2, 3, 3, 3, 3])
+    assert_allclose(xiong2009.lemma_bound(1, 2, 3, 0.0, 1.0, t), 2 + 3 * t)
+    assert_allclose(xiong2009.lemma_bound(1, 2, 3, 1e-9, 1.0, t), 2 + 3 * t, rtol=1e-6)
+    assert_allclose(xiong2009.lemma_bound(1, 2, 3, 0.0, 1.0, t, as_printed=True)[1:], 3 * t[1:] - 1)
+    assert_allclose(xiong2009.lemma_bound(1, 2, 3, 1.0, 1.0, t), [2, 3, 3, 3, 3])
 
 
 def test_fewer_measurements_than_states_leave_theorem_1_empty():
     eye = np.eye(6)
-    a = bounds.assumptions(eye, eye, eye[:2], eye, np.eye(2), eye)
+    a = xiong2009.assumptions(eye, eye, eye[:2], eye, np.eye(2), eye)
     assert (a.n, a.m, a.h_min, a.h_max) == (6, 2, 0.0, 1.0)
-    assert bounds.theorem_constants(a)[0] == 0.0
-    bound = bounds.theorem_bound(a, 1.0, TIMES)
+    assert xiong2009.theorem_constants(a)[0] == 0.0
+    bound = xiong2009.theorem_bound(a, 1.0, TIMES)
     assert_allclose(np.diff(bound), bound[1] - bound[0])
 
 
@@ -732,11 +730,11 @@ def test_the_rekf_attenuates_every_disturbance_below_gamma_squared():
     assert worst < 2.6**2 < ekf
     assert_allclose([worst, ekf], [5.9452, 8.0630], rtol=1e-4)
     units = np.eye(errors.shape[-1])[None]
-    each = bounds.attenuation_ratio(errors.mT, units)
+    each = xiong2009.attenuation_ratio(errors.mT, units)
     assert each.shape == (122,)
     assert each.max() < worst
     some = np.random.default_rng(0).normal(size=(1, 50, 122))
-    assert (bounds.attenuation_ratio((errors @ some[0].T).mT, some) < worst).all()
+    assert (xiong2009.attenuation_ratio((errors @ some[0].T).mT, some) < worst).all()
 
 
 def test_the_printed_attenuation_ratio_depends_on_units():
@@ -754,12 +752,12 @@ def test_the_printed_attenuation_ratio_depends_on_units():
         state = estimator.step(state, x + v[t], dynamics, sensor)
         error.append(x - state.estimate.mean)
     assert state.violations == 0
-    assert bounds.attenuation_ratio(np.array(error), w, v) > 1e3 * estimator.gamma**2
+    assert xiong2009.attenuation_ratio(np.array(error), w, v) > 1e3 * estimator.gamma**2
 
 
 def test_the_attenuation_ratio_sums_over_time():
     error = np.arange(12.0).reshape(3, 2, 2)
     w, start = np.ones((3, 2, 1)), np.full((1, 2, 4), 2.0)
-    got = bounds.attenuation_ratio(error, w, start)
+    got = xiong2009.attenuation_ratio(error, w, start)
     wanted = [sum(error[t, i] @ error[t, i] for t in range(3)) / (3 + 16) for i in range(2)]
     assert_allclose(got, wanted)

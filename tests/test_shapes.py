@@ -8,13 +8,16 @@ import pytest
 from test_probing import ALONE, PRIORS, RIGHT, WRONG, Model, Z
 
 from navfilters import FILTERS, Gaussian, SigmaPoints, sweep
-from navfilters.attitude import normalized
-from navfilters.continuous import ContinuousSystem, Reference, linearized_kalman_bucy
-from navfilters.continuous import extended_kalman_bucy as continuous
-from navfilters.discrete import DiscreteSystem, predict, update
-from navfilters.discrete import extended_kalman_filter as discrete
-from navfilters.multiplicative import MekfState, mekf_update
-from navfilters.robust import AdaptiveEKF, AdaptiveRobustEKF, ExtendedKalman, RobustEKF
+from navfilters.estimators.adaptive import AdaptiveEKF
+from navfilters.estimators.continuous import extended_kalman_bucy as continuous
+from navfilters.estimators.continuous import linearized_kalman_bucy
+from navfilters.estimators.continuous_system import ContinuousSystem, Reference
+from navfilters.estimators.discrete import DiscreteSystem, predict, update
+from navfilters.estimators.discrete import extended_kalman_filter as discrete
+from navfilters.estimators.extended import ExtendedKalman
+from navfilters.estimators.multiplicative import MekfState, mekf_update
+from navfilters.estimators.robust import AdaptiveRobustEKF, RobustEKF
+from navfilters.space.quaternions import normalized
 
 PRIORS3 = Gaussian(PRIORS.mean, np.stack([PRIORS.cov] * 3))
 TWO = SigmaPoints(alpha=[0.5, 1.0])

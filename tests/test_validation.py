@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from navfilters import Gaussian, validation
+from navfilters import Gaussian
+from navfilters.numerics import validation
 
 
 def test_a_float64_array_is_not_copied():

@@ -18,8 +18,8 @@ from IPython.core.interactiveshell import InteractiveShell
 from IPython.utils.capture import capture_output
 from matplotlib import pyplot as plt
 
-from navfilters import claims
-from navfilters.claims.verdicts import numbers
+from navfilters.book import claims
+from navfilters.book.claims.verdicts import numbers
 
 
 def noting(notes: dict[str, Any]) -> Any:

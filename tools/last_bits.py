@@ -20,7 +20,7 @@ from navfilters.types import Gaussian
 ARRAYS = {"array", "asarray", "diag", "Gaussian"}
 DRAWS = ("normal", "standard_normal", "uniform", "random", "exponential", "rayleigh")
 MORE_DRAWS = ("multivariate_normal", "standard_gamma", "gamma", "laplace", "standard_exponential")
-INPUTS_ARE_MADE_IN = ("__main__", "navfilters.experiments", "navfilters.models")
+INPUTS_ARE_MADE_IN = ("__main__", "navfilters.papers", "navfilters.models", "navfilters.space")
 
 
 def nudged(values: Any, seed: int) -> Any:

@@ -19,8 +19,8 @@ from typing import Any
 
 from machines import Variant, variants
 
-from navfilters import claims
-from navfilters.claims.verdicts import numbers
+from navfilters.book import claims
+from navfilters.book.claims.verdicts import numbers
 
 ROOT = Path(__file__).resolve().parent.parent
 STORED = ROOT / "book" / "spread.json"

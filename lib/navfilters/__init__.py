@@ -1,12 +1,17 @@
 """Kalman-type filters as one update with different moments, batched, and every claim checked."""
 
-from navfilters.engine import first_indefinite, run
-from navfilters.filters import FILTERS, Filter, kalman_update
-from navfilters.moments import SigmaPoints, linearized, second_order, unscented
-from navfilters.sweeping import Sweep, SweepError, sweep
+from navfilters import _moved
+from navfilters.estimators.filter import FILTERS, Filter
+from navfilters.estimators.moments import linearized, second_order, unscented
+from navfilters.estimators.sigma_points import SigmaPoints
+from navfilters.estimators.update import kalman_update
+from navfilters.runs.chunks import SweepError
+from navfilters.runs.loop import first_indefinite, run
+from navfilters.runs.sweeping import Sweep, sweep
 from navfilters.types import Gaussian, Moments
+from navfilters.version import __version__ as __version__
 
-__version__ = "0.1.0"
+_moved.announce()
 
 __all__ = [
     "FILTERS",

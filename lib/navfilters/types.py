@@ -58,7 +58,7 @@ class ExactMoments(Moments):
     Attributes
     ----------
     exact : array (..., n, n) or None
-        T of :func:`navfilters.linalg.semidefinite_root` of the prior's covariance.
+        T of :func:`navfilters.numerics.matrix_roots.semidefinite_root` of the prior's covariance.
     """
 
     exact: Array = None

@@ -12,8 +12,8 @@ import spread
 from browser import ROOT
 from IPython.core.inputtransformer2 import TransformerManager
 
-from navfilters import claims
-from navfilters.claims.verdicts import numbers
+from navfilters.book import claims
+from navfilters.book.claims.verdicts import numbers
 
 PATH = ROOT / "book" / "claims.toml"
 ENTRIES = tomllib.loads(PATH.read_text(encoding="utf-8"))["claim"]

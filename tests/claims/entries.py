@@ -1,6 +1,6 @@
 """Entries of a ledger that the tests change."""
 
-from navfilters.claims import ESTABLISHED, NOT_REPRODUCED, Claim
+from navfilters.book.claims import ESTABLISHED, NOT_REPRODUCED, Claim
 
 PAPER = {"value": 10.0, "bound": {"at_most": 1.0}, "order": ["a", "b", "c"], "boolean": True}
 

@@ -3,8 +3,8 @@
 import pytest
 from entries import ENTRY, finding, make
 
-from navfilters import claims
-from navfilters.claims import Badge, ClaimError
+from navfilters.book import claims
+from navfilters.book.claims import Badge, ClaimError
 
 # --- what is shown ------------------------------------------------------------------------------
 

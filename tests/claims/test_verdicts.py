@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from entries import finding, make
 
-from navfilters.claims import (
+from navfilters.book.claims import (
     ESTABLISHED,
     IN_SHAPE,
     NOT_REPRODUCED,

@@ -1,7 +1,7 @@
 """Images of the closed loop that take a second instead of half a minute."""
 
-from navfilters.experiments.sar_images import Imaging
-from navfilters.sar.echo import Radar
+from navfilters.papers.pogorelsky2020.imaging import Imaging
+from navfilters.sar.raw.radar import Radar
 
 # a quarter of PALSAR's wavelength has a quarter of its sensitivity to velocity
 SMALL = Imaging(

@@ -5,56 +5,59 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from navfilters import FILTERS, run
-from navfilters.experiments import divergence_maps as maps
-from navfilters.experiments.perea2007 import Setup, improvement, isotropic
 from navfilters.models import RangeBearing
+from navfilters.papers.perea2007 import __main__ as command
+from navfilters.papers.perea2007 import divergence_maps
+from navfilters.papers.perea2007.experiment import Setup, improvement, isotropic
 
 
 @pytest.mark.parametrize("size", [4, 40, 48, 256])
 def test_no_start_lies_on_the_line_of_sight_or_on_the_jump(size):
-    points = maps.starts(size)
+    points = divergence_maps.starts(size)
     assert points.shape == (size, size, 2)
     assert np.abs(points[..., 0] - points[..., 1]).min() > 100 / size
     assert np.abs(points[..., 1]).min() > 10 / size
-    low, high = maps.WINDOW
+    low, high = divergence_maps.WINDOW
     assert low < points.min() < points.max() < high
     assert_allclose(points[0, 1] - points[0, 0], [600 / size, 0])
 
 
 def test_one_point_of_each_map_is_a_run_from_there():
     setup = Setup()
-    h = run(FILTERS["UKFz"], isotropic(maps.starts(4)[2, 1], 100.0), setup.z, setup.model, 30)
-    I = maps.over_starts("UKFz", 4, steps=30)
+    h = run(
+        FILTERS["UKFz"], isotropic(divergence_maps.starts(4)[2, 1], 100.0), setup.z, setup.model, 30
+    )
+    I = divergence_maps.over_starts("UKFz", 4, steps=30)
     assert_allclose(I[2, 1], improvement(h, setup.x_true), rtol=1e-9)
 
-    sigma, ratio = maps.noises(4)
+    sigma, ratio = divergence_maps.noises(4)
     model = RangeBearing(np.diag([setup.bearing_variance * ratio[2] ** 2, setup.bearing_variance]))
     h = run(FILTERS["EKF"], isotropic(setup.x0, sigma[1]), setup.z, model, 30)
-    I = maps.over_noises("EKF", 4, steps=30)
+    I = divergence_maps.over_noises("EKF", 4, steps=30)
     assert_allclose(I[2, 1], improvement(h, setup.x_true), rtol=1e-9)
 
 
 def test_a_last_bit_is_one_and_changes_the_map_a_little():
-    assert_array_equal(maps.next_bit([1.0, -1.0]), [1 + 2**-52, -1 + 2**-53])
-    I = maps.over_starts("B-EKF 2", 4, steps=20)
-    changed = maps.over_starts("B-EKF 2", 4, steps=20, changed=True)
+    assert_array_equal(divergence_maps.next_bit([1.0, -1.0]), [1 + 2**-52, -1 + 2**-53])
+    I = divergence_maps.over_starts("B-EKF 2", 4, steps=20)
+    changed = divergence_maps.over_starts("B-EKF 2", 4, steps=20, changed=True)
     assert 0 < np.abs(changed / I - 1).max() < 1e-9
 
 
 def test_a_change_is_relative_and_has_a_floor():
-    found = maps.relative_change([1.0, 2.0, 1.0, np.nan], [1.0, 3.0, np.nan, 1.0])
+    found = divergence_maps.relative_change([1.0, 2.0, 1.0, np.nan], [1.0, 3.0, np.nan, 1.0])
     assert_array_equal(found, [2**-52, 0.5, np.nan, np.nan])
 
 
 @pytest.mark.slow
 def test_the_command_stores_every_map(tmp_path, capsys):
     out = tmp_path / "new" / "m"
-    maps.main(["--size", "3", "--steps", "2", "--out", str(out)])
+    command.main(["--size", "3", "--steps", "2", "--out", str(out)])
     stored = np.load(f"{out}.npz")
     assert len(stored.files) == 4 * len(FILTERS)
-    assert_array_equal(stored["starts mtSOF"], maps.over_starts("mtSOF", 3, steps=2))
+    assert_array_equal(stored["starts mtSOF"], divergence_maps.over_starts("mtSOF", 3, steps=2))
     assert_array_equal(
-        stored["noises changed UKF"], maps.over_noises("UKF", 3, changed=True, steps=2)
+        stored["noises changed UKF"], divergence_maps.over_noises("UKF", 3, changed=True, steps=2)
     )
     assert sorted(p.suffix for p in out.parent.iterdir()) == [".npz"] + [".png"] * 4
     assert "UKFz: " in capsys.readouterr().out
@@ -63,5 +66,5 @@ def test_the_command_stores_every_map(tmp_path, capsys):
 @pytest.mark.parametrize("wrong", [["--size", "1"], ["--steps", "0"]])
 def test_the_command_refuses_what_makes_no_map(wrong, capsys):
     with pytest.raises(SystemExit):
-        maps.main(wrong)
+        command.main(wrong)
     assert "must be at least" in capsys.readouterr().err

@@ -10,15 +10,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import solve_continuous_are, solve_discrete_are
 
 from navfilters import Gaussian
-from navfilters.continuous import (
-    ContinuousSystem,
-    extended_kalman_bucy,
-    linearized_kalman_bucy,
-    reference_residual,
-)
-from navfilters.derivatives import complex_step
-from navfilters.discrete import extended_kalman_filter, predict
-from navfilters.experiments.lecture16 import Setup, band_limited_noise, discretised, sampled
+from navfilters.estimators.continuous import extended_kalman_bucy, linearized_kalman_bucy
+from navfilters.estimators.continuous_system import ContinuousSystem, reference_residual
+from navfilters.estimators.discrete import extended_kalman_filter, predict
+from navfilters.numerics.complex_step import complex_step
+from navfilters.papers.lecture16.pendulum import Setup, band_limited_noise, discretised, sampled
 
 jax.config.update("jax_enable_x64", True)
 

@@ -17,22 +17,27 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.ndimage import map_coordinates
 
-from navfilters.experiments import palsar_loop, sar_closed_loop, sar_trn
-from navfilters.experiments.palsar_loop import run_filter, table, true_flight
-from navfilters.experiments.palsar_patches import (
-    cut_patches,
-    first_lines,
-    fitted,
-    flight_through,
-)
-from navfilters.experiments.sar_images import Imaging
-from navfilters.experiments.sar_trn import CASES, NOMINAL, Setup, initial_state
-from navfilters.frames import ecef_to_geodetic
-from navfilters.multiplicative import MekfState
-from navfilters.sar import echo
-from navfilters.sar.echo import Flight, Radar
-from navfilters.sar.palsar import Product, open_product
-from navfilters.sar.scene import LocalMap, Terrain, View, draw_scene, sample_posts
+from navfilters.estimators.multiplicative import MekfState
+from navfilters.papers import pogorelsky2020
+from navfilters.papers.pogorelsky2020 import CASES, NOMINAL, Setup, real_loop
+from navfilters.papers.pogorelsky2020 import __main__ as command
+from navfilters.papers.pogorelsky2020.imaging import Imaging
+from navfilters.papers.pogorelsky2020.real_flight import first_lines, fitted, flight_through
+from navfilters.papers.pogorelsky2020.real_loop import real_table as table
+from navfilters.papers.pogorelsky2020.real_loop import run_filter, true_flight
+from navfilters.papers.pogorelsky2020.real_patches import cut_patches
+from navfilters.papers.pogorelsky2020.true_flight import initial_state
+from navfilters.sar.ground.scene import View, draw_scene
+from navfilters.sar.ground.terrain import LocalMap, Terrain, sample_posts
+from navfilters.sar.palsar.opening import open_product
+from navfilters.sar.palsar.product import Product
+from navfilters.sar.raw.echoes_of_points import _half_aperture
+from navfilters.sar.raw.flight import Flight
+from navfilters.sar.raw.observation import _bright
+from navfilters.sar.raw.radar import Radar, Window
+from navfilters.sar.raw.rasters import scene_raster
+from navfilters.sar.raw.synthesis import synthesize
+from navfilters.space.frames import ecef_to_geodetic
 
 rasterio = pytest.importorskip("rasterio")
 warp = pytest.importorskip("rasterio.warp")
@@ -114,16 +119,16 @@ def world(orbit):
         flight = Flight.through(Setup().orbit.derivative, orbit(line_time(line)), 3.0)
         latitude, longitude, height = terrain_point(flight, terrain, centre_range)
         scene = draw_scene(terrain, LocalMap(latitude, longitude), [5, k], half_width=2600.0)
-        window = echo.Window(0.0, 0, COLUMNS - FIRST_COLUMN, NEAR + FIRST_COLUMN * SPACING)
-        half = echo._half_aperture(RADAR, flight, window) + SMALL.lines // 2
+        window = Window(0.0, 0, COLUMNS - FIRST_COLUMN, NEAR + FIRST_COLUMN * SPACING)
+        half = _half_aperture(RADAR, flight, window) + SMALL.lines // 2
         window = window._replace(first_time=-half / RADAR.prf, pulses=2 * half)
         size = SMALL.lines, SMALL.samples
-        received = echo.synthesize(
+        received = synthesize(
             RADAR,
             flight,
             window,
-            echo._bright(RADAR, flight, scene, window, *size, [6, k]),
-            echo.scene_raster(RADAR, flight, scene, window, *size, [7, k]),
+            _bright(RADAR, flight, scene, window, *size, [6, k]),
+            scene_raster(RADAR, flight, scene, window, *size, [7, k]),
             mean_height=height,
         )
         scenes.append(scene)
@@ -361,11 +366,11 @@ def test_patches_that_do_not_fit(folder, product, change, message):
 
 def test_a_flight_of_ones_own_is_flown():
     setup = replace(Setup(), shortest=2)
-    own = sar_trn.truth(setup, 2)
-    plain = sar_trn.monte_carlo(setup, 2, 3)
-    assert_array_equal(sar_trn.monte_carlo(setup, 2, 3, flight=own).errors, plain.errors)
+    own = pogorelsky2020.truth(setup, 2)
+    plain = pogorelsky2020.monte_carlo(setup, 2, 3)
+    assert_array_equal(pogorelsky2020.monte_carlo(setup, 2, 3, flight=own).errors, plain.errors)
     with pytest.raises(ValueError, match="flight must last 3 intervals, one an update; found 2"):
-        sar_trn.monte_carlo(setup, 3, 3, flight=own)
+        pogorelsky2020.monte_carlo(setup, 3, 3, flight=own)
 
 
 def at_the_truth(patch):
@@ -376,7 +381,7 @@ def at_the_truth(patch):
 @pytest.mark.slow
 def test_no_line_and_no_sample_is_lost(patches):
     """A line is 6.2 m along the track and a sample 4.7 m of range: the mean misses are smaller."""
-    images = palsar_loop.RealImages(patches, np.zeros((1, 3)), SMALL)
+    images = pogorelsky2020.RealImages(patches, np.zeros((1, 3)), SMALL)
     misses = []
     for k, patch in enumerate(patches, start=1):
         a = patch.acquired
@@ -390,8 +395,8 @@ def test_no_line_and_no_sample_is_lost(patches):
 @pytest.mark.slow
 def test_the_command_navigates(folder, capsys, monkeypatch):
     """From the files to the table, each number of which is read back here."""
-    monkeypatch.setattr(palsar_loop, "report", partial(palsar_loop.report, imaging=SMALL))
-    sar_trn.main(
+    monkeypatch.setattr(command, "report", partial(pogorelsky2020.report, imaging=SMALL))
+    command.main(
         f"--closed-loop --palsar {folder} --dem {folder}/dem.tif --reference "
         f"{folder}/reference.tif --case TC-2 --runs 2 --seed 1".split()
     )
@@ -449,7 +454,7 @@ def test_a_climb_without_a_peak_is_reported(product, patches):
 
 @pytest.mark.slow
 def test_the_range_has_the_runs_own_noise(product, patches):
-    images = palsar_loop.RealImages(patches, np.array([[1.5, 0.0, 0.0]]), BLIND)
+    images = pogorelsky2020.RealImages(patches, np.array([[1.5, 0.0, 0.0]]), BLIND)
     state = at_the_truth(patches[0])
     found = replace(images, imaging=SMALL)(1, state)
     assert_allclose(found.slant_range, patches[0].slant_range + 1.5)
@@ -466,15 +471,15 @@ def narrow(tmp_path_factory, orbit, world):
     folder, centre, columns = tmp_path_factory.mktemp("fbd"), int(CENTRES[1]), COLUMNS // 2
     flight = Flight.through(Setup().orbit.derivative, orbit(line_time(centre)), 3.0)
     scene, size = world.scenes[1], (SMALL.lines, SMALL.samples // 2)
-    window = echo.Window(0.0, 0, columns, NEAR + FIRST_COLUMN * SPACING - 40 * FBD.range_spacing)
-    half = echo._half_aperture(FBD, flight, window) + SMALL.lines // 2
+    window = Window(0.0, 0, columns, NEAR + FIRST_COLUMN * SPACING - 40 * FBD.range_spacing)
+    half = _half_aperture(FBD, flight, window) + SMALL.lines // 2
     window = window._replace(first_time=-half / FBD.prf, pulses=2 * half)
-    received = echo.synthesize(
+    received = synthesize(
         FBD,
         flight,
         window,
-        echo._bright(FBD, flight, scene, window, *size, [6, 1]),
-        echo.scene_raster(FBD, flight, scene, window, *size, [7, 1]),
+        _bright(FBD, flight, scene, window, *size, [6, 1]),
+        scene_raster(FBD, flight, scene, window, *size, [7, 1]),
         mean_height=float(scene.height(0.0, 0.0)),
     )
     parts = received.view(np.float32).reshape(*received.shape, 2)
@@ -530,33 +535,33 @@ def test_options_reach_the_reader(monkeypatch, capsys):
     def opening(folder, **options):
         raise ValueError(f"{folder} {options}")
 
-    monkeypatch.setattr(palsar_loop, "open_product", opening)
+    monkeypatch.setattr(real_loop, "open_product", opening)
     options = "--polarisation HV --records 5 900 --clock-offset -0.002"
     with pytest.raises(SystemExit) as ended:
-        sar_trn.main(f"--closed-loop --palsar A --dem B --reference C {options}".split())
+        command.main(f"--closed-loop --palsar A --dem B --reference C {options}".split())
     assert ended.value.code == (
         "A {'polarisation': 'HV', 'records': [5, 900], 'clock_offset': -0.002}"
     )
 
 
 def test_the_unit_of_the_reference_reaches_its_reader(monkeypatch, capsys):
-    monkeypatch.setattr(palsar_loop, "open_product", lambda folder, **options: None)
+    monkeypatch.setattr(real_loop, "open_product", lambda folder, **options: None)
 
     def cutting(product, elevation, reference, **options):
         raise ValueError(f"{elevation} {reference} {options['unit']} {options['geoid']}")
 
-    monkeypatch.setattr(palsar_loop, "cut_patches", cutting)
+    monkeypatch.setattr(real_loop, "cut_patches", cutting)
     for more, said in (("--reference-unit linear --geoid 7", "linear 7.0"), ("", "None 0.0")):
         with pytest.raises(SystemExit) as ended:
-            sar_trn.main(f"--closed-loop --palsar A --dem B --reference C {more}".split())
+            command.main(f"--closed-loop --palsar A --dem B --reference C {more}".split())
         assert ended.value.code == f"B C {said}"
 
 
 def test_the_closed_loop_is_a_command_of_its_own(monkeypatch):
     asked = []
-    monkeypatch.setattr(sar_closed_loop, "main", asked.append)
-    sar_trn.main(["--closed-loop", "--case", "TC-2", "--seed", "3"])
-    assert asked == [["--case=TC-2", "--runs=100", "--seed=3"]]
+    monkeypatch.setattr(command, "closed_table", lambda *a, **o: asked.append(a) or "")
+    command.main(["--closed-loop", "--case", "TC-2", "--seed", "3"])
+    assert asked == [("TC-2", 100, 3)]
 
 
 @pytest.mark.parametrize(
@@ -576,13 +581,13 @@ def test_the_closed_loop_is_a_command_of_its_own(monkeypatch):
 )
 def test_arguments_that_do_not_fit(arguments, message, capsys):
     with pytest.raises(SystemExit) as ended:
-        sar_trn.main(arguments.split())
+        command.main(arguments.split())
     assert ended.value.code == 2
     assert message in capsys.readouterr().err
 
 
 def test_files_that_are_not_there_end_the_command(tmp_path):
-    command = [sys.executable, "-m", "navfilters.experiments.sar_trn", "--closed-loop"]
+    command = [sys.executable, "-m", "navfilters.papers.pogorelsky2020", "--closed-loop"]
     files = ["--palsar", str(tmp_path / "none"), "--dem", "B", "--reference", "C"]
     done = subprocess.run([*command, *files], capture_output=True, text=True, check=False)
     assert done.returncode == 1
@@ -592,9 +597,9 @@ def test_files_that_are_not_there_end_the_command(tmp_path):
 
 @pytest.mark.slow
 def test_a_product_without_its_elevation_model_ends_the_command(folder, monkeypatch):
-    monkeypatch.setattr(palsar_loop, "report", partial(palsar_loop.report, imaging=SMALL))
+    monkeypatch.setattr(command, "report", partial(pogorelsky2020.report, imaging=SMALL))
     with pytest.raises(SystemExit) as ended:
-        sar_trn.main(
+        command.main(
             f"--closed-loop --palsar {folder} --dem {folder}/none.tif --reference C".split()
         )
     assert "none.tif: No such file" in ended.value.code

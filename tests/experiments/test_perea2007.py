@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from navfilters import FILTERS, Gaussian, run
-from navfilters.experiments.perea2007 import Setup, improvement, isotropic, position_error
 from navfilters.models import RangeBearing
+from navfilters.papers.perea2007.experiment import Setup, improvement, isotropic, position_error
 
 STEPS = [1, 2, 10, 100, 1000]
 

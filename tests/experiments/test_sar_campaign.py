@@ -10,22 +10,25 @@ import pytest
 from numpy.testing import assert_array_equal
 from small_images import SMALL
 
-from navfilters.experiments import sar_campaign
-from navfilters.experiments.sar_campaign import campaign
-from navfilters.experiments.sar_closed_loop import monte_carlo_closed
-from navfilters.experiments.sar_images import Imaging, assumed_speeds
-from navfilters.experiments.sar_trn import CASES, monte_carlo
+from navfilters.papers import pogorelsky2020
+from navfilters.papers.pogorelsky2020 import __main__ as command
+from navfilters.papers.pogorelsky2020.campaign import run_campaign as campaign
+from navfilters.papers.pogorelsky2020.closed_loop import monte_carlo_closed
+from navfilters.papers.pogorelsky2020.experiment import CASES
+from navfilters.papers.pogorelsky2020.image_tables import assumed_speeds
+from navfilters.papers.pogorelsky2020.imaging import Imaging
+from navfilters.papers.pogorelsky2020.open_loop import monte_carlo
 
 pytestmark = pytest.mark.slow
 
 RUNS, DIRECT = 6, 2
 CHILD = """
 import sys
-from navfilters.experiments.sar_campaign import campaign
-from navfilters.experiments.sar_images import Imaging
-from navfilters.sar.echo import Radar
-from navfilters.sar.geolocate import Matcher
-campaign(sys.argv[1], {runs}, {direct}, imaging={imaging})
+from navfilters.papers.pogorelsky2020 import run_campaign
+from navfilters.papers.pogorelsky2020 import Imaging
+from navfilters.sar.raw import Radar
+from navfilters.sar.matching import Matcher
+run_campaign(sys.argv[1], {runs}, {direct}, imaging={imaging})
 """
 
 
@@ -61,7 +64,7 @@ def test_everything_is_stored(whole):
     for case in CASES:
         with np.load(folder / f"{case}.npz") as stored:
             assert_array_equal(stored["errors"], found.closed[case].errors)
-    assert (folder / "summary.txt").read_text() == sar_campaign.report(found)
+    assert (folder / "summary.txt").read_text() == pogorelsky2020.campaign_report(found)
 
 
 def test_it_is_the_closed_loop(whole):
@@ -160,8 +163,8 @@ def test_the_command_prints_what_it_found(whole, monkeypatch, capsys):
         calls.append(arguments)
         return whole[1]
 
-    monkeypatch.setattr(sar_campaign, "campaign", stored)
-    sar_campaign.main(["--folder", "there", "--runs", "6", "--direct", "2"])
+    monkeypatch.setattr(command, "run_campaign", stored)
+    command.main(["--campaign", "there", "--runs", "6", "--direct", "2"])
     out = capsys.readouterr().out
     assert calls == [("there", 6, 2, 0)]
     assert out.count("images failed") == 2
@@ -170,12 +173,12 @@ def test_the_command_prints_what_it_found(whole, monkeypatch, capsys):
 
 def test_the_command_says_what_is_wrong(monkeypatch, capsys):
     with pytest.raises(SystemExit):
-        sar_campaign.main(["--runs", "1"])
+        command.main(["--campaign", "there", "--runs", "1"])
     assert "runs must be an integer of at least 2; found 1" in capsys.readouterr().err
 
     def stopped(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sar_campaign, "campaign", stopped)
+    monkeypatch.setattr(command, "run_campaign", stopped)
     with pytest.raises(SystemExit, match="stopped; the same command goes on where it was"):
-        sar_campaign.main([])
+        command.main(["--campaign", "there"])

@@ -7,13 +7,19 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from small_images import SMALL
 
-from navfilters.experiments import sar_closed_loop
-from navfilters.experiments.sar_closed_loop import Images, monte_carlo_closed
-from navfilters.experiments.sar_images import Imaging, acquire, measure_directly, tabulate
-from navfilters.experiments.sar_trn import CASES, Setup, monte_carlo, noise, truth
-from navfilters.models.sar_geometry import Measurement
-from navfilters.multiplicative import MekfState
-from navfilters.sar.geolocate import Matcher
+from navfilters.estimators.multiplicative import MekfState
+from navfilters.papers import pogorelsky2020
+from navfilters.papers.pogorelsky2020 import __main__ as command
+from navfilters.papers.pogorelsky2020.acquisition import acquire, measure_directly
+from navfilters.papers.pogorelsky2020.closed_loop import Images, monte_carlo_closed
+from navfilters.papers.pogorelsky2020.experiment import CASES, Setup
+from navfilters.papers.pogorelsky2020.image_tables import tabulate
+from navfilters.papers.pogorelsky2020.imaging import Imaging
+from navfilters.papers.pogorelsky2020.noise_draws import noise
+from navfilters.papers.pogorelsky2020.open_loop import monte_carlo
+from navfilters.papers.pogorelsky2020.true_flight import truth
+from navfilters.sar.matching.matcher import Matcher
+from navfilters.space.image_measurement import Measurement
 
 pytestmark = pytest.mark.slow
 
@@ -143,17 +149,17 @@ def test_refusals(call, message):
 
 def test_table_of_the_command(monkeypatch, capsys):
     monkeypatch.setattr(
-        sar_closed_loop, "table", lambda case, runs, seed, progress: f"{case} {runs} {seed}"
+        command, "closed_table", lambda case, runs, seed, progress: f"{case} {runs} {seed}"
     )
-    sar_closed_loop.main(["--case", "TC-2", "--runs", "7"])
+    command.main(["--closed-loop", "--case", "TC-2", "--runs", "7"])
     assert capsys.readouterr().out == "TC-2, 7 runs, 1-sigma position at 25 s\nTC-2 7 0\n"
     with pytest.raises(SystemExit):
-        sar_closed_loop.main(["--runs", "1"])
+        command.main(["--closed-loop", "--runs", "1"])
     capsys.readouterr()
 
 
 def test_printed_table():
-    text = sar_closed_loop.table("TC-2", 5, imaging=SMALL)
+    text = pogorelsky2020.closed_table("TC-2", 5, imaging=SMALL)
     assert "closed loop" in text
     assert text.count("(m)") == 3
     assert "of 15 images failed" in text

@@ -10,22 +10,17 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
-from navfilters.attitude import conjugate, product, rotation_vector
-from navfilters.consistency import mean_nees, sample_deviation
-from navfilters.experiments import sar_trn
-from navfilters.experiments.sar_trn import (
-    CASES,
-    Setup,
-    SimulatedImages,
-    initial_state,
-    misalignment,
-    monte_carlo,
-    noise,
-    truth,
-)
-from navfilters.frames import ecef_to_geodetic, ellipsoid_intersection
-from navfilters.models.sar_geometry import Measurement
-from navfilters.multiplicative import MekfState, mekf_update
+from navfilters.estimators.multiplicative import MekfState, mekf_update
+from navfilters.papers import pogorelsky2020
+from navfilters.papers.pogorelsky2020 import __main__ as command
+from navfilters.papers.pogorelsky2020.experiment import CASES, Setup
+from navfilters.papers.pogorelsky2020.noise_draws import misalignment, noise
+from navfilters.papers.pogorelsky2020.open_loop import SimulatedImages, monte_carlo
+from navfilters.papers.pogorelsky2020.true_flight import _attitude, _circular, initial_state, truth
+from navfilters.runs.consistency import mean_nees, sample_deviation
+from navfilters.space.frames import ecef_to_geodetic, ellipsoid_intersection
+from navfilters.space.image_measurement import Measurement
+from navfilters.space.quaternions import conjugate, product, rotation_vector
 
 R0 = np.array([-1108465.150, -6100044.949, 3397134.666])
 V0 = np.array([-1003.9419331, 3801.3289491, 6498.2536689])
@@ -39,7 +34,7 @@ def results():
 def boresight_hit(setup, k=0):
     flight = truth(setup, 5)
     model = replace(setup.geometry, T_e_b=flight.T_e_b[k])
-    return ellipsoid_intersection(flight.x[k, :3], model.boresight(sar_trn.NOMINAL))
+    return ellipsoid_intersection(flight.x[k, :3], model.boresight(pogorelsky2020.NOMINAL))
 
 
 def test_constants():
@@ -90,7 +85,7 @@ def test_images_are_57_km_apart_and_reach_canada():
     hits = [boresight_hit(Setup(), k) for k in (1, 2)]
     assert_allclose(np.linalg.norm(hits[1] - hits[0]), 57e3, atol=1e3)
     model = replace(Setup().geometry, T_e_b=flight.T_e_b[-1])
-    last = ellipsoid_intersection(flight.x[-1, :3], model.boresight(sar_trn.NOMINAL))
+    last = ellipsoid_intersection(flight.x[-1, :3], model.boresight(pogorelsky2020.NOMINAL))
     assert 60 < ecef_to_geodetic(last)[0] < 75
     assert truth() is flight
 
@@ -322,18 +317,18 @@ def test_the_target_is_met_by_another_solver():
     setup = Setup(inclination=80.0, look=20.0, target=(50.0, 10.0))
 
     def miss(angles):
-        x = sar_trn._circular(setup, *angles)
-        model = replace(setup.geometry, T_e_b=sar_trn._attitude(setup, x))
-        hit = ellipsoid_intersection(x[:3], model.boresight(sar_trn.NOMINAL))
+        x = _circular(setup, *angles)
+        model = replace(setup.geometry, T_e_b=_attitude(setup, x))
+        hit = ellipsoid_intersection(x[:3], model.boresight(pogorelsky2020.NOMINAL))
         return np.array(ecef_to_geodetic(hit)[:2]) - setup.target
 
     found = root(miss, [0.9, -0.1], method="lm", options={"xtol": 1e-14})
-    assert_allclose(initial_state(setup)[:3], sar_trn._circular(setup, *found.x)[:3], atol=1e-2)
+    assert_allclose(initial_state(setup)[:3], _circular(setup, *found.x)[:3], atol=1e-2)
 
 
 def test_the_table_stands_beside_the_papers(capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "tqdm", None)  # as where it is not installed
-    sar_trn.main(["--case", "TC-2", "--runs", "2"])
+    command.main(["--case", "TC-2", "--runs", "2"])
     out, err = capsys.readouterr()
     assert out.startswith("TC-2, 2 runs, 1-sigma position at 600 s\n")
     assert "138 m, 86.2 %" in out
@@ -342,7 +337,7 @@ def test_the_table_stands_beside_the_papers(capsys, monkeypatch):
 
 
 def test_the_module_runs_as_a_command():
-    command = [sys.executable, "-m", "navfilters.experiments.sar_trn", "--runs", "1"]
+    command = [sys.executable, "-m", "navfilters.papers.pogorelsky2020", "--runs", "1"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "--runs must be at least 2 and --seed at least 0; found 1, 0" in done.stderr

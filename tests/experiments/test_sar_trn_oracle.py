@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from navfilters.experiments import sar_trn
 from navfilters.oracles import sar_trn as oracle
+from navfilters.papers import pogorelsky2020
 
 pytestmark = pytest.mark.slow
 
 
 def both(case, updates, seed):
     """Errors and covariances of one run by ours and by the oracle, from the same draws."""
-    setup, noise = sar_trn.CASES[case], sar_trn.noise([7], updates, seed)
+    setup, noise = pogorelsky2020.CASES[case], pogorelsky2020.noise([7], updates, seed)
     drawn = {
         "initial": np.sqrt(np.diag(setup.P0)) * noise.first[0],
         "feature": noise.pixel[0] * setup.pixel @ oracle.enu(*oracle.HOUSTON).T,
@@ -23,7 +23,7 @@ def both(case, updates, seed):
         "speed": setup.sigma_speed * noise.speed[0],
         "walk": np.sqrt(setup.psd_mu * setup.interval) * noise.walk[0],
     }
-    ours = sar_trn.monte_carlo(setup, updates, runs=[7], seed=seed)
+    ours = pogorelsky2020.monte_carlo(setup, updates, runs=[7], seed=seed)
     return (
         ours.errors[0, : updates + 1],
         ours.covariances[0, : updates + 1],
@@ -45,7 +45,7 @@ def test_a_run_is_the_oracles(case, updates):
 
 def test_the_truth_is_the_oracles():
     times = np.arange(0, 601, 100.0)
-    flight = sar_trn.truth()
+    flight = pogorelsky2020.truth()
     r, v = oracle.truth(times)
     at = np.rint(times / (600 / 72)).astype(int)
     assert_allclose(flight.x[at, :3], r, atol=1e-4)

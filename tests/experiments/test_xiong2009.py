@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters.experiments import xiong2009
-from navfilters.experiments.xiong2009 import (
-    ESTIMATORS,
-    VARIANTS,
-    Setup,
-    cramer_rao_bound,
+from navfilters.estimators.extended import ExtendedKalman
+from navfilters.estimators.robust import AdaptiveRobustEKF
+from navfilters.papers.xiong2009 import __main__ as command
+from navfilters.papers.xiong2009.cramer_rao import cramer_rao_bound
+from navfilters.papers.xiong2009.experiment import ESTIMATORS, VARIANTS, Setup
+from navfilters.papers.xiong2009.monte_carlo import (
     errors,
     noise,
     position_errors,
     rms_error,
     root_mean_square,
-    truth,
 )
-from navfilters.models.orbit import EARTH, Orbit, perigee_apogee
-from navfilters.robust import AdaptiveRobustEKF, ExtendedKalman
+from navfilters.papers.xiong2009.true_flight import truth
+from navfilters.space.gravity import EARTH
+from navfilters.space.inertial_orbit import Orbit, perigee_apogee
 
 pytestmark = pytest.mark.slow
 
@@ -254,7 +254,7 @@ def test_an_interval_is_propagated_once(name, monkeypatch):
 
 def test_the_table_stands_beside_the_papers(short, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "tqdm", None)  # as where it is not installed
-    xiong2009.main(["--variant", "B", "--seeds", "2"])
+    command.main(["--variant", "B", "--seeds", "2"])
     out, err = capsys.readouterr()
     assert out.startswith("variant B, 2 seeds\n")
     for name, estimator in ESTIMATORS.items():
@@ -265,7 +265,7 @@ def test_the_table_stands_beside_the_papers(short, capsys, monkeypatch):
 
 
 def test_the_module_runs_as_a_command():
-    command = [sys.executable, "-m", "navfilters.experiments.xiong2009", "--seeds", "0"]
+    command = [sys.executable, "-m", "navfilters.papers.xiong2009", "--seeds", "0"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "--seeds must be at least 1; found 0" in done.stderr

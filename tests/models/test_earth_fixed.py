@@ -9,9 +9,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
-from navfilters.models import earth_fixed, gravity, orbit
-from navfilters.models.gravity import EARTH
-from navfilters.models.orbit import EarthFixedOrbit, Orbit
+from navfilters.space import gravity
+from navfilters.space.earth_fixed_orbit import EarthFixedOrbit
+from navfilters.space.gravity import EARTH, Gravity
+from navfilters.space.inertial_orbit import Orbit
 
 jax.config.update("jax_enable_x64", True)
 
@@ -53,9 +54,9 @@ def inertial_flight(x, seconds):
 
 
 def test_users_find_everything_in_orbit():
-    assert orbit.EarthFixedOrbit is earth_fixed.EarthFixedOrbit
-    assert orbit.Gravity is gravity.Gravity
-    assert orbit.EARTH is gravity.EARTH
+    assert EarthFixedOrbit is EarthFixedOrbit
+    assert Gravity is gravity.Gravity
+    assert EARTH is gravity.EARTH
     assert EarthFixedOrbit().rate == W
 
 

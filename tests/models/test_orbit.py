@@ -9,8 +9,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
-from navfilters.models import orbit
-from navfilters.models.orbit import EARTH, Gravity, Orbit, Thrust, perigee_apogee
+from navfilters.space import inertial_orbit
+from navfilters.space.gravity import EARTH, Gravity
+from navfilters.space.inertial_orbit import Orbit, perigee_apogee
+from navfilters.space.thrust import COASTING, Thrust
 
 jax.config.update("jax_enable_x64", True)
 
@@ -114,7 +116,7 @@ def test_thrust_is_along_the_velocity():
 @pytest.mark.parametrize(
     ("integrator", "relative"), [("rk4", 1e-7), ("euler", 1e-10)], ids=lambda v: str(v)
 )
-@pytest.mark.parametrize("thrust", [orbit.COASTING, BURN], ids=["coasting", "burn"])
+@pytest.mark.parametrize("thrust", [COASTING, BURN], ids=["coasting", "burn"])
 def test_transition_is_the_derivative_of_the_interval(integrator, relative, thrust):
     """Differences of fourth order are good to 1e-10 themselves; Euler's F is exact."""
     x, dynamics = states(), Orbit(thrust=thrust, integrator=integrator)
@@ -170,7 +172,7 @@ def test_runge_kutta_keeps_energy_and_momentum():
 
 
 @pytest.mark.parametrize("integrator", ["rk4", "euler"])
-@pytest.mark.parametrize("thrust", [orbit.COASTING, BURN], ids=["coasting", "burn"])
+@pytest.mark.parametrize("thrust", [COASTING, BURN], ids=["coasting", "burn"])
 def test_noise_accumulates_as_step_by_step(integrator, thrust):
     """P <- F P F^T + Q over each sub-step is F P F^T + accumulate(Q) over the interval."""
     whole = Orbit(thrust=thrust, Q=Q, integrator=integrator)
@@ -225,7 +227,7 @@ def test_batch_axes_come_first_and_members_do_not_meet(batch):
 @pytest.mark.parametrize("cached", [1, 13, 10**6])
 def test_the_size_of_the_cache_changes_nothing(monkeypatch, cached):
     wanted = Orbit(thrust=BURN).interval(states())
-    monkeypatch.setattr(orbit, "CACHED", cached)
+    monkeypatch.setattr(inertial_orbit, "CACHED", cached)
     assert_array_equal(Orbit(thrust=BURN).interval(states()).F, wanted.F)
 
 
@@ -256,12 +258,12 @@ def test_arcs_of_thrust():
     thrust = Thrust(0.5, ((10, 20), (30, 40)))
     times = [0, 10, 19.9, 20, 29, 30, 39.5, 40]
     assert [thrust.strength(t) for t in times] == [0, 0.5, 0.5, 0, 0, 0.5, 0.5, 0]
-    assert orbit.COASTING.strength(0.0) == 0
+    assert COASTING.strength(0.0) == 0
 
 
 def test_thrust_acts_in_its_sub_steps_only():
     x = low_orbit()
-    burn, coast = (Orbit(thrust=t).interval(x).path for t in (BURN, orbit.COASTING))
+    burn, coast = (Orbit(thrust=t).interval(x).path for t in (BURN, COASTING))
     assert_array_equal(burn[:30], coast[:30])
     assert (burn[30] != coast[30]).any()
     gained = np.linalg.norm(burn[69, 3:]) - np.linalg.norm(coast[69, 3:])

@@ -12,15 +12,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from navfilters.attitude import cross_matrix, from_rotation_vector, matrix, product
-from navfilters.frames import (
-    antenna_axes,
-    body_axes,
-    ellipsoid_intersection,
-    enu_covariance,
-)
-from navfilters.models.sar_geometry import Measurement, SarGeometry
-from navfilters.multiplicative import MekfState
+from navfilters.estimators.multiplicative import MekfState
+from navfilters.space.frames import antenna_axes, body_axes, ellipsoid_intersection, enu_covariance
+from navfilters.space.image_measurement import Measurement, SarGeometry
+from navfilters.space.quaternions import cross_matrix, from_rotation_vector, matrix, product
 
 jax.config.update("jax_enable_x64", True)
 

@@ -7,7 +7,7 @@ from mpmath import acos, diff, mp, mpf
 from numpy.testing import assert_allclose, assert_array_equal
 
 from navfilters import Gaussian, linearized, unscented
-from navfilters.models.star_earth_sensor import StarEarthSensor
+from navfilters.space.star_earth_sensor import StarEarthSensor
 
 jax.config.update("jax_enable_x64", True)
 

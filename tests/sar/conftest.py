@@ -4,10 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from navfilters.experiments.sar_images import Imaging, acquire
-from navfilters.experiments.sar_trn import NOMINAL, Setup, truth
-from navfilters.frames import ellipsoid_intersection
-from navfilters.sar.echo import Flight, Radar
+from navfilters.papers.pogorelsky2020.acquisition import acquire
+from navfilters.papers.pogorelsky2020.experiment import NOMINAL, Setup
+from navfilters.papers.pogorelsky2020.imaging import Imaging
+from navfilters.papers.pogorelsky2020.true_flight import truth
+from navfilters.sar.raw.flight import Flight
+from navfilters.sar.raw.radar import Radar
+from navfilters.space.frames import ellipsoid_intersection
 
 
 @pytest.fixture(scope="session")

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from navfilters.sar.autofocus import autofocus, hill_climb, sharpness
-from navfilters.sar.echo import centred_window, point_echo, receive
-from navfilters.sar.focus import Focuser
+from navfilters.sar.images.autofocusing import autofocus, hill_climb, sharpness
+from navfilters.sar.images.focuser import Focuser
+from navfilters.sar.raw.echoes_of_points import point_echo
+from navfilters.sar.raw.observation import centred_window
+from navfilters.sar.raw.radar import receive
 
 
 def test_sharpness_is_normalized_variance():

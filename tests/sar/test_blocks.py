@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters.sar._blocks import PIECE, blocks, in_threads, lines_at_once, phasor, unit
+from navfilters.sar.phase_blocks import PIECE, blocks, in_threads, lines_at_once, phasor, unit
 
 
 def quadratic(rate):

@@ -8,24 +8,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters.frames import ecef_to_geodetic, geodetic_to_ecef
-from navfilters.sar import echo, focus
-from navfilters.sar.echo import (
-    PALSAR,
-    Echoes,
-    Flight,
-    Radar,
-    Raster,
-    Window,
-    centred_window,
-    observe,
-    point_echo,
-    receive,
-    scene_raster,
-    synthesize,
-    view_of,
-)
-from navfilters.sar.scene import LocalMap, draw_scene, sample_terrain
+import navfilters.sar
+from navfilters.sar.ground.scene import draw_scene
+from navfilters.sar.ground.terrain import LocalMap, sample_terrain
+from navfilters.sar.raw.echoes_of_points import Echoes, _history, point_echo
+from navfilters.sar.raw.flight import Flight, view_of
+from navfilters.sar.raw.observation import centred_window, observe
+from navfilters.sar.raw.radar import PALSAR, Radar, Window, receive
+from navfilters.sar.raw.rasters import _facets, _lattice, _to_radar, scene_raster
+from navfilters.sar.raw.synthesis import Raster, synthesize
+from navfilters.space.frames import ecef_to_geodetic, geodetic_to_ecef
 
 
 def at(flight, hit, dt, dR, height):
@@ -89,7 +81,7 @@ def test_window_of_the_paper(flight, hit):
     t, R = flight.closest(hit)
     assert_allclose(window.first_time + window.pulses // 2 / PALSAR.prf, t, atol=1e-12)
     assert_allclose(window.near_range + 512 * PALSAR.range_spacing, R)
-    edge, _ = echo._history(PALSAR, flight, hit, np.array([window.first_time + 1024 / PALSAR.prf]))
+    edge, _ = _history(PALSAR, flight, hit, np.array([window.first_time + 1024 / PALSAR.prf]))
     assert_allclose((edge - R) / PALSAR.range_spacing, 18, atol=0.6)
     with pytest.raises(ValueError, match="lines must be even"):
         centred_window(PALSAR, flight, hit, lines=101)
@@ -191,9 +183,9 @@ def test_facets_are_where_they_are(flight, scene):
     """The polynomials to time and range against the exact solution: 1e-3 of a sample."""
     view = view_of(flight, geodetic_to_ecef(scene.map.latitude, scene.map.longitude))
     along, across = np.linspace(-3400, 3400, 7), np.linspace(-4800, 4800, 9)
-    east, north = echo._lattice(view, along, across)
+    east, north = _lattice(view, along, across)
     height = scene.height(east, north)
-    got = echo._to_radar(flight, scene, view, along, across, height)
+    got = _to_radar(flight, scene, view, along, across, height)
     exact = flight.closest(geodetic_to_ecef(*scene.map.geodetic(east, north), height))
     assert_allclose(got[0], exact[0], atol=1e-3 / PALSAR.prf)
     assert_allclose(got[1], exact[1], atol=1e-3 * PALSAR.range_spacing)
@@ -204,7 +196,7 @@ def test_raster_keeps_the_power(small, flight, scene):
     lines, samples = 128, 96
     p = geodetic_to_ecef(scene.map.latitude, scene.map.longitude, scene.height(0.0, 0.0))
     window = centred_window(small, flight, p, lines, samples)
-    power, height, first = echo._facets(small, flight, scene, window, lines, samples, 8)
+    power, height, first = _facets(small, flight, scene, window, lines, samples, 8)
     assert first == (window.pulses - lines) // 2 - 8
     view = view_of(flight, p)
     reach = 0.7 * lines / 2 / small.prf * 6792, 0.5 * samples / 2 * 7.5
@@ -258,11 +250,17 @@ def test_radar_refuses(change, message):
 def test_echo_and_focus_share_nothing():
     """Neither imports from the other, and no number is imported by both."""
     names = {}
-    for module in (echo, focus):
-        tree = ast.parse(Path(module.__file__).read_text(encoding="utf-8"))
-        froms = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
-        names[module] = {(n.module, a.name) for n in froms for a in n.names}
-    for module, other in ((echo, "focus"), (focus, "echo")):
-        assert not any(other in (source or "") for source, _ in names[module])
-    shared = {pair for pair in names[echo] & names[focus] if pair[0] not in ("typing", "scipy")}
-    assert shared == {("navfilters", "validation"), ("navfilters.types", "Array")}
+    for package in ("raw", "images"):
+        names[package] = set()
+        for module in (Path(navfilters.sar.__file__).parent / package).glob("*.py"):
+            tree = ast.parse(module.read_text(encoding="utf-8"))
+            froms = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+            names[package] |= {(n.module, a.name) for n in froms for a in n.names}
+    for package, other in (("raw", "images"), ("images", "raw")):
+        assert not any(f"sar.{other}" in (source or "") for source, _ in names[package])
+    shared = {
+        pair
+        for pair in names["raw"] & names["images"]
+        if pair[0].split(".")[0] in ("navfilters", "numpy")
+    }
+    assert shared == {("navfilters.numerics", "validation"), ("navfilters.types", "Array")}

@@ -9,26 +9,17 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.constants import c
 from scipy.fft import next_fast_len
 
-from navfilters.experiments.sar_trn import NOMINAL, truth
-from navfilters.frames import east_north_up, ecef_to_geodetic, ellipsoid_intersection
-from navfilters.sar.autofocus import sharpness
-from navfilters.sar.echo import (
-    PALSAR,
-    Radar,
-    Raw,
-    centred_window,
-    point_echo,
-    receive,
-    view_of,
-)
-from navfilters.sar.focus import (
-    Focuser,
-    Image,
-    decibels,
-    effective_velocity,
-    multilook,
-    to_ground,
-)
+from navfilters.papers.pogorelsky2020.experiment import NOMINAL
+from navfilters.papers.pogorelsky2020.true_flight import truth
+from navfilters.sar.images.autofocusing import sharpness
+from navfilters.sar.images.focuser import Focuser
+from navfilters.sar.images.ground_image import decibels, multilook, to_ground
+from navfilters.sar.images.slant_image import Image, effective_velocity
+from navfilters.sar.raw.echoes_of_points import point_echo
+from navfilters.sar.raw.flight import view_of
+from navfilters.sar.raw.observation import centred_window
+from navfilters.sar.raw.radar import PALSAR, Radar, Raw, receive
+from navfilters.space.frames import east_north_up, ecef_to_geodetic, ellipsoid_intersection
 
 LONG = Radar(wavelength=0.059, flat_beam=True)  # the pulse of PALSAR, a quarter of its aperture
 

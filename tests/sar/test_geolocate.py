@@ -8,15 +8,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.ndimage import affine_transform
 
-from navfilters.experiments.sar_images import _locate
-from navfilters.frames import ecef_to_geodetic
-from navfilters.sar.focus import GroundImage, to_ground
-from navfilters.sar.geolocate import (
-    Features,
-    Matcher,
-    form_reference,
-    geolocate,
-)
+from navfilters.papers.pogorelsky2020.acquisition import _locate
+from navfilters.sar.images.ground_image import GroundImage, to_ground
+from navfilters.sar.matching.geolocation import geolocate
+from navfilters.sar.matching.matcher import Features, Matcher
+from navfilters.sar.matching.reference import form_reference
+from navfilters.space.frames import ecef_to_geodetic
 
 
 @pytest.fixture(scope="module")

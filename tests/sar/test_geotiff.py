@@ -9,9 +9,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.ndimage import gaussian_filter
 
-from navfilters.sar.geolocate import Reference
-from navfilters.sar.geotiff import median_height, read_reference, read_terrain
-from navfilters.sar.scene import LandCover, LocalMap, Points, Scene, sample_terrain
+from navfilters.sar.ground.land_cover import LandCover
+from navfilters.sar.ground.scene import Points, Scene
+from navfilters.sar.ground.terrain import LocalMap, sample_terrain
+from navfilters.sar.matching.reference import Reference
+from navfilters.sar.palsar.geotiff_reader import median_height, read_reference, read_terrain
 
 rasterio = pytest.importorskip("rasterio")
 warp = pytest.importorskip("rasterio.warp")

@@ -8,8 +8,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.ndimage import gaussian_filter
 
-from navfilters.sar.geotiff import LARGEST_GEOID, median_height, read_reference, read_terrain
-from navfilters.sar.scene import LandCover, LocalMap, Points, Scene, Terrain, sample_terrain
+from navfilters.sar.ground.land_cover import LandCover
+from navfilters.sar.ground.scene import Points, Scene
+from navfilters.sar.ground.terrain import LocalMap, Terrain, sample_terrain
+from navfilters.sar.palsar.geotiff_posts import LARGEST_GEOID
+from navfilters.sar.palsar.geotiff_reader import median_height, read_reference, read_terrain
 
 rasterio = pytest.importorskip("rasterio")
 warp = pytest.importorskip("rasterio.warp")

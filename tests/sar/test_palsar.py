@@ -44,20 +44,24 @@ from palsar_files import (
 )
 from scipy.interpolate import BarycentricInterpolator
 
-from navfilters.sar import _palsar_leader, palsar
+from navfilters.sar.palsar import leader_file
+from navfilters.sar.palsar import product as opened_product
+from navfilters.sar.palsar.__main__ import main
+from navfilters.sar.palsar.leader_file import read_leader
+from navfilters.sar.palsar.opening import open_product
 
 C = 299792458.0
 
 
 def opened(folder, image=IMAGE, leader=LEADER, **options):
-    return palsar.open_product(product(folder, image, leader), **options)
+    return open_product(product(folder, image, leader), **options)
 
 
 def refused(folder, byte, *words, image=IMAGE, leader=LEADER, file="IMG-HH", **options):
     """The message has the file, the byte, what is needed and what was found."""
     product(folder, image, leader)
     with pytest.raises(ValueError) as caught:  # noqa: PT011, its text is looked at here
-        palsar.open_product(folder, **options)
+        open_product(folder, **options)
     message = str(caught.value)
     assert message.startswith(f"{folder / f'{file}-{NAME}'}, byte {byte}: "), message
     assert " must be " in message
@@ -374,7 +378,7 @@ def test_doppler_centroid(tmp_path, monkeypatch, f):
     got = opened(tmp_path, image_bytes(codes=codes, line=line))
     assert got.doppler_centroid(0, LINES) == pytest.approx(f, abs=1.0)
     z = got.read(0, LINES)
-    monkeypatch.setattr(palsar, "_BLOCK", 7)
+    monkeypatch.setattr(opened_product, "_BLOCK", 7)
     phase = np.angle(np.sum(z[:-1].conj() * z[1:]))
     assert got.doppler_centroid(0, LINES) == pytest.approx(phase / (2 * np.pi * PRI), abs=1e-3)
     with pytest.raises(ValueError, match="last must be at most the 64 lines"):
@@ -392,11 +396,11 @@ def test_any_polarisation_that_the_name_does_not_deny(tmp_path):
     (folder / f"IMG-HV-{NAME}").write_bytes(crossed)
     (folder / f"IMG-HH-{NAME}").write_bytes(IMAGE)
     with pytest.raises(ValueError, match=r"one file IMG-\.\.\.; found IMG-HH.*, IMG-HV.*choose"):
-        palsar.open_product(folder)
-    assert palsar.open_product(folder, polarisation="HV").polarisation == "HV"
-    assert palsar.open_product(str(folder), polarisation="hh").polarisation == "HH"
+        open_product(folder)
+    assert open_product(folder, polarisation="HV").polarisation == "HV"
+    assert open_product(str(folder), polarisation="hh").polarisation == "HH"
     with pytest.raises(ValueError, match=r"one file IMG-VV-\.\.\.; found none"):
-        palsar.open_product(folder, polarisation="VV")
+        open_product(folder, polarisation="VV")
 
 
 NUMBERS = [
@@ -708,7 +712,7 @@ def test_absurd_claims_allocate_nothing(tmp_path):
             tracemalloc.reset_peak()
             before = tracemalloc.get_traced_memory()[0]
             with pytest.raises(ValueError, match=rf"{path.name}, byte {byte}: .*must be"):
-                palsar.open_product(tmp_path)
+                open_product(tmp_path)
             assert tracemalloc.get_traced_memory()[1] - before < 300_000
     finally:
         tracemalloc.stop()
@@ -718,18 +722,18 @@ def test_absurd_claims_allocate_nothing(tmp_path):
 
 def test_folders_that_hold_no_product(tmp_path):
     with pytest.raises(ValueError, match=rf"{tmp_path} must hold one file IMG-\.\.\.; found none"):
-        palsar.open_product(tmp_path)
+        open_product(tmp_path)
     product(tmp_path)
     (tmp_path / "LED-other").write_bytes(LEADER)
     with pytest.raises(ValueError, match=r"one file LED-\.\.\.; found LED-ALPSRP.*, LED-other"):
-        palsar.open_product(tmp_path)
+        open_product(tmp_path)
     (tmp_path / f"LED-{NAME}").unlink()
     with pytest.raises(ValueError, match="image and leader of one scene"):
-        palsar.open_product(tmp_path)
+        open_product(tmp_path)
     (tmp_path / "LED-other").unlink()
     (tmp_path / f"LED-{NAME}").mkdir()
     with pytest.raises(ValueError, match=r"one file LED-\.\.\.; found none"):
-        palsar.open_product(tmp_path)
+        open_product(tmp_path)
 
 
 BESIDE = [
@@ -752,7 +756,7 @@ def test_what_other_programs_leave_beside_the_files_hides_nothing(tmp_path, besi
         own = LEADER if name.startswith("LED") else IMAGE
         marked = name.startswith(("IMG-HH-{}", "LED-{}", "._"))
         (tmp_path / name.format(NAME)).write_bytes(own if copy and marked else b"<PAMDataset/>")
-    got = palsar.open_product(tmp_path, **options)
+    got = open_product(tmp_path, **options)
     assert (got.image.name, got.leader.name) == (f"IMG-HH-{NAME}", f"LED-{NAME}")
 
 
@@ -763,7 +767,7 @@ def test_two_scenes_whose_names_begin_alike_are_two(tmp_path):
     with pytest.raises(
         ValueError, match=r"one file IMG-\.\.\.; found .*scene1, .*scene1-b, .*scene10"
     ):
-        palsar.open_product(tmp_path)
+        open_product(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -779,7 +783,7 @@ def test_two_scenes_whose_names_begin_alike_are_two(tmp_path):
 def test_a_folder_without_an_image_says_what_it_has(tmp_path, name, words):
     (tmp_path / name).write_bytes(b"?")
     with pytest.raises(ValueError, match=f"one file IMG-...; found {words}"):
-        palsar.open_product(tmp_path)
+        open_product(tmp_path)
 
 
 KINDS = [
@@ -807,7 +811,7 @@ def test_the_command_names_files_that_are_never_read(tmp_path, kind, data):
     path = tmp_path / f"{kind}-{NAME}"
     path.write_bytes(data)
     with pytest.raises(SystemExit) as ended:
-        palsar.main([str(path)])
+        main([str(path)])
     assert f"({kind})" in ended.value.code
     assert "IMG-... or a leader file LED-..." in ended.value.code
 
@@ -872,7 +876,7 @@ def test_a_leader_is_walked_to_its_end(tmp_path):
     """Genuine ones have a pair of count and length for each kind of facility, or none."""
     for leader in (facilities(5000, 728), counted(facilities(5000, 728), 5000, 728)):
         (tmp_path / f"LED-{NAME}").write_bytes(leader)
-        records = _palsar_leader.read_leader(tmp_path / f"LED-{NAME}").records
+        records = read_leader(tmp_path / f"LED-{NAME}").records
         assert [(start, length) for start, _, length in records[-3:]] == [
             (30900, 3072), (33972, 5000), (38972, 728),
         ]  # fmt: skip
@@ -911,17 +915,17 @@ def test_what_follows_the_last_record_is_told(tmp_path, extra):
 
 def test_errors_of_the_system_stay_its_own(tmp_path, monkeypatch):
     with pytest.raises(FileNotFoundError):
-        palsar.open_product(tmp_path / "nowhere")
+        open_product(tmp_path / "nowhere")
     product(tmp_path)
     with pytest.raises(NotADirectoryError):
-        palsar.open_product(tmp_path / f"LED-{NAME}")
+        open_product(tmp_path / f"LED-{NAME}")
 
     def deny(path, *_, **__):
         raise PermissionError(13, "Permission denied", str(path))
 
-    monkeypatch.setattr(_palsar_leader, "open", deny, raising=False)
+    monkeypatch.setattr(leader_file, "open", deny, raising=False)
     with pytest.raises(PermissionError, match=f"LED-{NAME}"):
-        palsar.open_product(tmp_path)
+        open_product(tmp_path)
 
 
 def survives(folder, image, leader):
@@ -991,7 +995,7 @@ def test_every_field_is_printed_as_it_stands(tmp_path, capsys):
         written = {
             start + offset: (kind, value) for start, part in rows for offset, kind, value in part
         }
-        palsar.main([str(tmp_path / f"{file}-{NAME}")])
+        main([str(tmp_path / f"{file}-{NAME}")])
         printed = capsys.readouterr().out.split("lines; smallest")[0]
         shown = re.findall(r"^ +(\d+)  (?!record)(.{38}) (.*)$", printed, re.M)
         assert len(shown) >= 30
@@ -1003,14 +1007,14 @@ def test_every_field_is_printed_as_it_stands(tmp_path, capsys):
 
 def test_the_command_prints_fields_with_their_bytes(tmp_path, capsys):
     product(tmp_path)
-    palsar.main([str(tmp_path / f"IMG-HH-{NAME}")])
+    main([str(tmp_path / f"IMG-HH-{NAME}")])
     text = capsys.readouterr().out
     assert re.search(rf"^ +186 +signal record length +{LENGTH}$", text, re.M)
     assert re.search(r"^ +776 +PRF in mHz +2132196$", text, re.M)
     assert re.search(r"^ +724 +record codes +50 10 18 20$", text, re.M)
     assert re.search(r"^ +line number +1 to 64$", text, re.M)
     assert "slant range in m" in text
-    palsar.main([str(tmp_path / f"LED-{NAME}")])
+    main([str(tmp_path / f"LED-{NAME}")])
     text = capsys.readouterr().out
     assert re.search(r"^ +4816 +record 18 30 18 20, 4680 bytes$", text, re.M)
     assert re.search(r"^ +1220 +wavelength in m +0\.2360571$", text, re.M)
@@ -1025,7 +1029,7 @@ def test_the_command_says_what_is_wrong(tmp_path):
         ("no", "No such"),
     ]:
         with pytest.raises(SystemExit, match=message):
-            palsar.main([str(tmp_path / name)])
+            main([str(tmp_path / name)])
 
 
 def test_the_module_runs_as_a_command(tmp_path):

@@ -6,22 +6,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters.frames import ecef_to_geodetic, geodetic_to_ecef
-from navfilters.sar.scene import (
-    COVER,
-    LandCover,
+from navfilters.sar.ground.land_cover import COVER, LandCover, lambert, smooth_field
+from navfilters.sar.ground.scene import Points, Scene, View, draw_scene
+from navfilters.sar.ground.terrain import (
     LocalMap,
-    Points,
-    Scene,
     Terrain,
-    View,
-    draw_scene,
-    lambert,
     sample_posts,
     sample_terrain,
-    smooth_field,
     terrain_hit,
 )
+from navfilters.space.frames import ecef_to_geodetic, geodetic_to_ecef
 
 PLACE = (30.0, -95.0)
 MAP = LocalMap(*PLACE)

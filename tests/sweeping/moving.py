@@ -6,7 +6,9 @@ import numpy as np
 from naive import covariances, quadratic
 
 from navfilters import Gaussian
-from navfilters.robust import AdaptiveEKF, AdaptiveRobustEKF, ExtendedKalman, RobustEKF
+from navfilters.estimators.adaptive import AdaptiveEKF
+from navfilters.estimators.extended import ExtendedKalman
+from navfilters.estimators.robust import AdaptiveRobustEKF, RobustEKF
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,10 +8,10 @@ from moving import moving
 from numpy.testing import assert_array_equal
 
 from navfilters import FILTERS, Gaussian, SigmaPoints, sweep
-from navfilters.experiments.perea2007 import Setup
+from navfilters.estimators.robust import AdaptiveRobustEKF
 from navfilters.models import RangeBearing
-from navfilters.robust import AdaptiveRobustEKF
-from navfilters.sweeping import KEEP
+from navfilters.papers.perea2007.experiment import Setup
+from navfilters.runs.sweeping import KEEP
 
 BASE = Setup()
 PRIORS = Gaussian(np.random.default_rng(0).normal(BASE.x0, 10.0, (10, 2)), BASE.prior.cov)

@@ -33,7 +33,7 @@ def test_a_model_that_was_changed_is_compiled_anew():
 
 
 def test_what_cannot_change_is_compiled_once():
-    from navfilters.sweeping import compiled
+    from navfilters.runs import compiled
 
     compiled._program.cache_clear()
     for factor in (1.0, 2.0):

@@ -10,10 +10,10 @@ from naive import covariances
 from numpy.testing import assert_allclose, assert_array_equal
 
 from navfilters import FILTERS, Gaussian, SigmaPoints, SweepError, sweep
-from navfilters.experiments.perea2007 import Setup
+from navfilters.estimators.robust import RobustEKF
 from navfilters.models import RangeBearing
-from navfilters.robust import RobustEKF
-from navfilters.sweeping import compiled
+from navfilters.papers.perea2007.experiment import Setup
+from navfilters.runs import compiled
 
 pytestmark = pytest.mark.slow
 

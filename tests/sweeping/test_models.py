@@ -10,9 +10,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from navfilters import FILTERS, Gaussian, SweepError, run, sweep
+from navfilters.estimators.extended import ExtendedKalman
 from navfilters.models import RangeBearing
-from navfilters.robust import ExtendedKalman
-from navfilters.sweeping.trees import flatten, unflatten
+from navfilters.runs.trees import flatten, unflatten
 
 R = np.diag([0.04, 1e-4])
 MANY = R * np.arange(1.0, 6.0)[:, None, None]

@@ -10,8 +10,8 @@ from distributed import Client, LocalCluster
 from numpy.testing import assert_array_equal
 
 from navfilters import FILTERS, Gaussian, SweepError, sweep
-from navfilters.experiments.perea2007 import Setup
-from navfilters.sweeping import workers as places
+from navfilters.papers.perea2007.experiment import Setup
+from navfilters.runs import workers as places
 
 BASE = Setup()
 EKF = FILTERS["EKF"]

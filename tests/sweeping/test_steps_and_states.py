@@ -10,12 +10,13 @@ from naive import covariances
 from numpy.testing import assert_allclose, assert_array_equal
 
 from navfilters import FILTERS, Gaussian, SweepError, sweep
-from navfilters.attitude import from_rotation_vector, rotation_vector
-from navfilters.frames import body_axes, ellipsoid_intersection, enu_covariance
+from navfilters.estimators.extended import ExtendedKalman
+from navfilters.estimators.multiplicative import MekfState, mekf_update
+from navfilters.estimators.robust import AdaptiveRobustEKF
 from navfilters.models import Linear
-from navfilters.models.sar_geometry import Measurement, SarGeometry
-from navfilters.multiplicative import MekfState, mekf_update
-from navfilters.robust import AdaptiveRobustEKF, ExtendedKalman
+from navfilters.space.frames import body_axes, ellipsoid_intersection, enu_covariance
+from navfilters.space.image_measurement import Measurement, SarGeometry
+from navfilters.space.quaternions import from_rotation_vector, rotation_vector
 
 engines = pytest.mark.parametrize("engine", ["numpy", pytest.param("jax", marks=pytest.mark.slow)])
 quiet = partial(sweep, progress=False)

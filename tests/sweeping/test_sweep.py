@@ -11,10 +11,10 @@ from naive import covariances, quadratic
 from numpy.testing import assert_array_equal
 
 from navfilters import FILTERS, Gaussian, SigmaPoints, SweepError, first_indefinite, run, sweep
-from navfilters.experiments.perea2007 import Setup, position_error
+from navfilters.estimators.extended import ExtendedKalman
 from navfilters.models import Linear, RangeBearing
-from navfilters.robust import ExtendedKalman
-from navfilters.sweeping.problems import CACHED, SENT, Problem
+from navfilters.papers.perea2007.experiment import Setup, position_error
+from navfilters.runs.problems import CACHED, SENT, Problem
 
 BASE = Setup()
 MODEL = BASE.model

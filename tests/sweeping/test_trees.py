@@ -8,7 +8,7 @@ from numpy.testing import assert_array_equal
 
 from navfilters import FILTERS, Gaussian, SigmaPoints
 from navfilters.models import Linear, RangeBearing
-from navfilters.sweeping.trees import flatten, unflatten
+from navfilters.runs.trees import flatten, unflatten
 
 VALUES = {
     "filter": (FILTERS["EKF"], []),

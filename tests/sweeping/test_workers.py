@@ -14,7 +14,7 @@ from distributed import Client, LocalCluster
 from numpy.testing import assert_array_equal
 
 from navfilters import FILTERS, Gaussian, SweepError, sweep
-from navfilters.experiments.perea2007 import Setup
+from navfilters.papers.perea2007.experiment import Setup
 
 pytestmark = pytest.mark.slow
 

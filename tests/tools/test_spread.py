@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 sys.path.insert(0, str(Path(__file__).parent.parent / "claims"))
 from entries import make
 
-from navfilters.claims import NOT_REPRODUCED
+from navfilters.book.claims import NOT_REPRODUCED
 
 
 @given(st.floats(1e-300, 1e300))

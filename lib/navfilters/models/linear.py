@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navfilters import validation
+from navfilters.numerics import validation
 from navfilters.types import Array
 
 

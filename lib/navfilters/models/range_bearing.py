@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from navfilters import validation
-from navfilters._analytic import atan2, hypot
-from navfilters.linalg import matrix, vector
+from navfilters.numerics import validation
+from navfilters.numerics.analytic import atan2, hypot
+from navfilters.numerics.small_matrices import matrix, vector
 from navfilters.types import Array
 
 

@@ -30,10 +30,18 @@ try:
 except ImportError:
     raise ImportError("this oracle needs mpmath: pip install navfilters[book]") from None
 
-__all__ = ["NAMES", "history", "measurement_moments", "position_error", "update"]
+from navfilters.oracles.two_by_two import (
+    add,
+    is_positive_definite,
+    outer,
+    spectral_norm,
+    square_root,
+)
 
 _EKF_FAMILY = ("EKF", "B-EKF 1", "B-EKF 2", "B-EKF 3", "B-EKF 4")
+
 _SOF_FAMILY = ("mtSOF", "B-mtSOF")
+
 _UKF_FAMILY = ("UKF", "B-UKF", "UKFz")
 
 NAMES = _EKF_FAMILY + _SOF_FAMILY + _UKF_FAMILY
@@ -71,50 +79,6 @@ def _second_order_bias(x, p):
     return b1, b2
 
 
-# --- 2x2 algebra -------------------------------------------------------------------------------
-
-
-def _add(a, b, factor=1):
-    """The symmetric matrix a + factor * b."""
-    return tuple(u + factor * v for u, v in zip(a, b, strict=True))
-
-
-def _outer(b):
-    """The symmetric matrix b b^T."""
-    return b[0] * b[0], b[0] * b[1], b[1] * b[1]
-
-
-def _is_positive_definite(p):
-    """Both leading minors are positive."""
-    p11, p12, p22 = p
-    return p11 > 0 and p11 * p22 - p12 * p12 > 0
-
-
-def _spectral_norm(p):
-    """Largest absolute eigenvalue of a symmetric matrix: |mean| + radius."""
-    p11, p12, p22 = p
-    radius = mp.sqrt(((p11 - p22) / 2) ** 2 + p12 * p12)
-    return abs((p11 + p22) / 2) + radius
-
-
-def _square_root(p, root):
-    """The two columns of a square root of P, for Eq. (21).
-
-    "cholesky" is the lower factor; "symmetric" is the principal root
-    (P + s I) / sqrt(trace P + 2 s) with s = sqrt(det P).
-    """
-    p11, p12, p22 = p
-    if root == "cholesky":
-        l11 = mp.sqrt(p11)
-        l21 = p12 / l11
-        return (l11, l21), (mpf(0), mp.sqrt(p22 - l21 * l21))
-    if root == "symmetric":
-        s = mp.sqrt(p11 * p22 - p12 * p12)
-        t = mp.sqrt(p11 + p22 + 2 * s)
-        return ((p11 + s) / t, p12 / t), (p12 / t, (p22 + s) / t)
-    raise ValueError(f"root is 'cholesky' or 'symmetric', not {root!r}")
-
-
 # --- zhat, Pzz and Pxz of each filter ----------------------------------------------------------
 
 
@@ -139,9 +103,9 @@ def _ekf_noise(name, x, p, r, hph, bump):
     rho2 = x[0] * x[0] + x[1] * x[1]
     hht = (mpf(1), mpf(0), 1 / rho2)
     if name == "B-EKF 1":
-        return _add(noise, hph, bump)
+        return add(noise, hph, bump)
     if name == "B-EKF 2":
-        return _add(noise, hht, _spectral_norm(p))
+        return add(noise, hht, spectral_norm(p))
     if name == "B-EKF 3":
         largest = max(r[0], rho2 * r[1])
         return tuple(largest * entry for entry in hht)
@@ -160,7 +124,7 @@ def _unscented(x, p, alpha, beta, kappa, root):
     w = 1 / (2 * scale)
 
     offsets = [(mpf(0), mpf(0))]
-    for column in _square_root(p, root):
+    for column in square_root(p, root):
         u, v = gamma * column[0], gamma * column[1]
         offsets += [(u, v), (-u, -v)]
     images = [_h((x[0] + u, x[1] + v)) for u, v in offsets]
@@ -169,9 +133,9 @@ def _unscented(x, p, alpha, beta, kappa, root):
     z2 = w0_mean * images[0][1] + w * sum(image[1] for image in images[1:])
     residuals = [(a - z1, b - z2) for a, b in images]
 
-    spread = tuple(w0_cov * entry for entry in _outer(residuals[0]))
+    spread = tuple(w0_cov * entry for entry in outer(residuals[0]))
     for residual in residuals[1:]:
-        spread = _add(spread, _outer(residual), w)
+        spread = add(spread, outer(residual), w)
     # The central point has no offset, so it drops out of Pxz.
     pairs = list(zip(offsets, residuals, strict=True))[1:]
     pxz = tuple(w * sum(o[i] * e[j] for o, e in pairs) for i in (0, 1) for j in (0, 1))
@@ -213,18 +177,18 @@ def measurement_moments(name, x, p, r, *, bump=1, alpha=1, beta=2, kappa=1, root
     noise = (r[0], mpf(0), r[1])
     if name in _EKF_FAMILY:
         hph, pxz = _linear(x, p)
-        return _h(x), _add(_ekf_noise(name, x, p, r, hph, bump), hph), pxz
+        return _h(x), add(_ekf_noise(name, x, p, r, hph, bump), hph), pxz
     if name in _SOF_FAMILY:
         hph, pxz = _linear(x, p)
         bias = _second_order_bias(x, p)
         copies = 2 if name == "B-mtSOF" else 1
-        pzz = _add(_add(noise, hph, copies), _outer(bias), -1)
+        pzz = add(add(noise, hph, copies), outer(bias), -1)
         z1, z2 = _h(x)
         return (z1 + bias[0], z2 + bias[1]), pzz, pxz
     if name in _UKF_FAMILY:
         mean, spread, pxz = _unscented(x, p, alpha, beta, kappa, root)
         copies = 2 if name == "B-UKF" else 1
-        return (_h(x) if name == "UKFz" else mean), _add(noise, spread, copies), pxz
+        return (_h(x) if name == "UKFz" else mean), add(noise, spread, copies), pxz
     raise ValueError(f"unknown filter {name!r}; the names are {', '.join(NAMES)}")
 
 
@@ -325,9 +289,9 @@ def history(
         for k in range(steps + 1):
             if k > 0:
                 if name == "B-EKF 4":  # Eq. (17), before the update
-                    p = (_spectral_norm(p), mpf(0), _spectral_norm(p))
+                    p = (spectral_norm(p), mpf(0), spectral_norm(p))
                 x, p = update(x, p, z, *measurement_moments(name, x, p, r, **options))
-            if name in _UKF_FAMILY and not _is_positive_definite(p):
+            if name in _UKF_FAMILY and not is_positive_definite(p):
                 raise ValueError(f"{name}: P is not positive definite after update {k}")
             if wanted is None or k in wanted:
                 entries.append((k, x, p))

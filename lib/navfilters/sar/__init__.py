@@ -1,1 +1,1 @@
-"""Synthetic aperture radar: from the echo to a position on the ground."""
+"""Synthetic aperture radar: raw data, ground, images, matching, and PALSAR files."""

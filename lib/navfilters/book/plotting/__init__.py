@@ -1,0 +1,49 @@
+"""Figures: one identity per filter, curves, maps and diagrams."""
+
+from navfilters.book.plotting.curves import (
+    at_floor,
+    curve,
+    ellipse,
+    ellipse_points,
+    error_axes,
+    label_ends,
+    mark_failures,
+    panels,
+    sweep_panels,
+)
+from navfilters.book.plotting.drawings import block_diagram, coastlines, map_panels
+from navfilters.book.plotting.styles import (
+    BOUND,
+    EKF,
+    MEASUREMENT,
+    ROBUST,
+    SECOND_ORDER,
+    STYLES,
+    TRUTH,
+    UKF,
+    use_style,
+)
+
+__all__ = [
+    "BOUND",
+    "EKF",
+    "MEASUREMENT",
+    "ROBUST",
+    "SECOND_ORDER",
+    "STYLES",
+    "TRUTH",
+    "UKF",
+    "at_floor",
+    "block_diagram",
+    "coastlines",
+    "curve",
+    "ellipse",
+    "ellipse_points",
+    "error_axes",
+    "label_ends",
+    "map_panels",
+    "mark_failures",
+    "panels",
+    "sweep_panels",
+    "use_style",
+]

@@ -1,0 +1,70 @@
+"""One identity per filter through the whole book."""
+
+from typing import Any
+
+from navfilters.numerics.extras import missing
+
+try:
+    import matplotlib.pyplot as plt
+except ImportError as error:
+    raise missing("matplotlib", "navfilters[book]", "plotting", error) from None
+
+
+EKF, SECOND_ORDER, UKF, MEASUREMENT = "#D55E00", "#009E73", "#0072B2", "#E69F00"
+
+ROBUST = "#CC79A7"
+
+TRUTH, BOUND = "black", "0.55"
+
+_DASHES: dict[str, Any] = {
+    "plain": "-",
+    "dashed": (0, (5, 2)),
+    "dotted": (0, (1, 1.4)),
+    "dash-dot": (0, (6, 2, 1, 2)),
+    "long dash": (0, (11, 3)),
+    "dash-dot-dot": (0, (6, 2, 1, 2, 1, 2)),
+}
+
+_VARIANTS = {
+    "EKF": (EKF, "plain", "o"),
+    "B-EKF 1": (EKF, "dashed", "s"),
+    "B-EKF 2": (EKF, "dotted", "^"),
+    "B-EKF 3": (EKF, "dash-dot", "D"),
+    "B-EKF 4": (EKF, "long dash", "v"),
+    "mtSOF": (SECOND_ORDER, "plain", "o"),
+    "B-mtSOF": (SECOND_ORDER, "dashed", "s"),
+    "UKF": (UKF, "plain", "o"),
+    "B-UKF": (UKF, "dashed", "s"),
+    "UKFz": (UKF, "dash-dot-dot", "P"),
+    "REKF": (ROBUST, "plain", "o"),
+    "AEKF": (ROBUST, "dashed", "s"),
+    "AREKF": (ROBUST, "dash-dot-dot", "P"),
+}
+
+STYLES: dict[str, dict[str, Any]] = {
+    name: {"color": color, "linestyle": _DASHES[dash], "marker": marker}
+    for name, (color, dash, marker) in _VARIANTS.items()
+}
+"""Matplotlib keywords of each filter."""
+
+
+def use_style() -> None:
+    """Set Matplotlib's defaults for this book; called once, at the top of a chapter."""
+    plt.rcParams.update(
+        {
+            "figure.figsize": (7.0, 4.2),
+            "figure.dpi": 130,
+            "figure.constrained_layout.use": True,
+            "figure.facecolor": "white",
+            "savefig.facecolor": "white",
+            "font.size": 10,
+            "axes.spines.top": False,
+            "axes.spines.right": False,
+            "axes.grid": True,
+            "grid.color": "0.9",
+            "grid.linewidth": 0.6,
+            "lines.linewidth": 1.6,
+            "lines.markersize": 4.5,
+            "legend.frameon": False,
+        }
+    )

@@ -1,0 +1,1 @@
+"""Filters: moments, variants, rules, and the update that they share."""

@@ -1,0 +1,191 @@
+"""The adaptive EKF: process noise tuned by the autocorrelation of the innovations."""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from navfilters.estimators.extended import (
+    Dynamics,
+    _given,
+    _moved,
+    _noise,
+    _spread,
+    _update,
+    _zeros,
+)
+from navfilters.numerics import validation
+from navfilters.numerics.small_matrices import right_divide
+from navfilters.types import Array, Gaussian, MeasurementModel
+
+
+class AdaptiveState(NamedTuple):
+    """What the AEKF remembers.
+
+    Parameters
+    ----------
+    estimate : Gaussian
+        mean (..., n), cov (..., n, n), after the last update.
+    innovations : array (..., N + k, m)
+        The last innovations, the newest at the end; zeros before the first.
+    count : int array (...)
+        Innovations so far.
+    factor : array (..., n, n)
+        E of the last step; the identity at first and without ``memory``.
+    """
+
+    estimate: Gaussian
+    innovations: Array
+    count: Array
+    factor: Array
+
+
+def _paper_directions() -> np.ndarray:
+    """The pattern of Eq. (44): each star's direction, in the velocity components."""
+    half = 0.5**0.5
+    return np.array([[0, 0], [0, 0], [0, 0], [half, 0], [0, 1], [half, 0]])
+
+
+@dataclass(frozen=True, eq=False)
+class AdaptiveEKF:
+    """The extended Kalman filter that tunes Q by the autocorrelation of its innovations.
+
+    Sigma = F P F^T + E Q_0 E^T,   E = expm(A M A^T / 2),   M = (C_1 + ... + C_k) C_0^-1,
+    C_i = (N - 1)^-1 sum of y_j y_{j-i}^T over the last N innovations y_j
+
+    Parameters
+    ----------
+    a : float or array (...)
+        Factor of the coefficient matrix, A = a * directions.
+    k : int
+        Number of autocorrelations, at least 1.
+    N : int
+        Window of each, at least 2.
+    directions : array (..., n, m)
+        Where each innovation drives the process noise; the paper's for a state of position and
+        velocity and two stars.
+    current : bool
+        Whether the newest y_j is that of the step itself, which is known before Q because it
+        depends on the predicted mean alone, instead of that of the step before.
+    memory : bool
+        Whether each step multiplies the last one's E, instead of the identity: Q is an integrator.
+    cap : float or array (...)
+        With ``memory``, the largest tr(E Q_0 E^T) / tr Q_0; E is scaled down to it. The text has
+        none.
+
+    Raises
+    ------
+    ValueError
+        Values that are not finite, or a k or N that is too small or not an integer.
+
+    Notes
+    -----
+    The printed formulas cannot be computed, and this is a reading of them, *memoryless and
+    congruent*. (A.17) with B = A^T of (44) is A M A, an (n, m) matrix on both sides of an (m, m):
+    A M A^T is meant. (45) has H M H^T with H (m, n): H^T M H is meant, and since H is about 1e-7
+    rad/m its exponent is below 1e-12 and nothing is tuned; A, which (44) defines for this, takes
+    its place. Q_t = Q_{t-1} expm(...) is not symmetric, and as a product over the steps it
+    explodes unless it is capped (``memory``, ``cap``): by default Q_0 is enlarged afresh at each
+    step, by the half exponent from both sides, which is Q_0 expm(A M A^T) when the two commute and
+    M is symmetric, and always a covariance. (46) is
+    printed for i = 1, 2 and holds for C_0 too. It ends with y_t, and whether Q_t enters the
+    prediction of t or of t + 1 is open: a prediction is made before the measurement, so the second
+    is the default, and ``current`` is the first. Until N + k innovations exist, Q is Q_0. The k
+    "in (A.16)" of section 5 is the one in (A.17).
+
+    Autocorrelations that are negative on the whole *shrink* Q; this feedback has no floor.
+
+    References
+    ----------
+    xiong2009, Eqs. (A.16), (A.17), (44)-(46).
+    """
+
+    a: Array = 1.5
+    k: int = 2
+    N: int = 15
+    directions: Array = field(default_factory=_paper_directions, metadata={"axes": 2})
+    current: bool = False
+    memory: bool = False
+    cap: Array = np.inf
+
+    def __post_init__(self) -> None:
+        validation.real_array("a", self.a, "")
+        if not (np.asarray(self.cap) > 0).all():
+            raise ValueError(f"cap must be positive; found {self.cap}")
+        checked = {
+            "k": validation.whole_number("k", self.k, 1),
+            "N": validation.whole_number("N", self.N, 2),
+            "directions": validation.real_array("directions", self.directions, "n, m"),
+            "current": validation.flag("current", self.current),
+            "memory": validation.flag("memory", self.memory),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+    def init(self, prior: Gaussian) -> AdaptiveState:
+        """The state before any measurement; as :meth:`ExtendedKalman.init`."""
+        prior = _given(prior)
+        xp = prior.mean.__array_namespace__()
+        count = _zeros(prior)
+        window = (*count.shape, self.N + self.k, np.shape(self.directions)[-1])
+        n = prior.mean.shape[-1]
+        return AdaptiveState(
+            prior, xp.zeros(window), count, xp.zeros((*count.shape, n, n)) + xp.eye(n)
+        )
+
+    def step(
+        self, state: AdaptiveState, z: Array, dynamics: Dynamics, sensor: MeasurementModel
+    ) -> AdaptiveState:
+        """One prediction with the tuned Q and one update; as :meth:`ExtendedKalman.step`."""
+        x, F = _moved(state.estimate, dynamics)
+        xp = x.__array_namespace__()
+        z = validation.given("z", z)
+        y = (z - validation.core("sensor.h", sensor.h(x), z.shape[-1:]))[..., None, :]
+        past = xp.broadcast_to(state.innovations, (*y.shape[:-2], *state.innovations.shape[-2:]))
+        window = xp.concat([past[..., 1:, :], y], axis=-2)
+        count = xp.broadcast_to(state.count + 1, y.shape[:-2])
+        used, exist = (window, count) if self.current else (past, count - 1)
+        E = self._factor(used, (exist >= self.N + self.k)[..., None, None])
+        noise = _noise(state.estimate, dynamics)
+        if self.memory:
+            E = E @ state.factor
+            growth = xp.linalg.trace(E @ noise @ E.mT) / xp.linalg.trace(noise)
+            kept = xp.asarray(self.cap) / growth
+            E = xp.sqrt(xp.where(kept < 1, kept, 1.0))[..., None, None] * E
+        prior = Gaussian(x, _spread(state.estimate, F, dynamics, E @ noise @ E.mT))
+        estimate = _update(prior, z, sensor)
+        factor = E if self.memory else state.factor
+        factor = xp.broadcast_to(factor, (*estimate.mean.shape[:-1], *E.shape[-2:]))
+        return AdaptiveState(estimate, window, count, factor)
+
+    def _factor(self, window: Array, full: Array) -> Array:
+        """E of the class docstring, the identity for members whose window is not full."""
+        xp = window.__array_namespace__()
+        newest = window[..., self.k :, :].mT
+        C = [
+            newest @ window[..., self.k - i : self.k - i + self.N, :] / (self.N - 1)
+            for i in range(self.k + 1)
+        ]
+        M = right_divide(sum(C[1:]), xp.where(full, C[0], xp.eye(C[0].shape[-1])))
+        A = xp.asarray(self.a)[..., None, None] * xp.asarray(self.directions)
+        return _expm(xp.where(full, A @ M @ A.mT / 2, 0.0))
+
+
+def _expm(A: Array) -> Array:
+    """Matrix exponential of a stack: Taylor to degree 14 of A / 2^s, squared s times.
+
+    Each member has its own s, with norm(A) / 2^s at most 1/2. A norm above 1024, where doubles
+    overflow, gives NaN.
+    """
+    xp = A.__array_namespace__()
+    identity = xp.eye(A.shape[-1])
+    norm = xp.max(xp.sum(xp.abs(A), axis=-1), axis=-1)
+    usable = norm <= 1024.0  # and not NaN
+    halvings = xp.ceil(xp.log2(xp.where(usable & (norm > 0.5), norm, 0.5) / 0.5))[..., None, None]
+    scaled = xp.where(usable[..., None, None], A, xp.nan) / 2**halvings
+    E = identity + scaled / 14
+    for j in range(13, 0, -1):
+        E = identity + scaled @ E / j
+    for j in range(11):
+        E = xp.where(j < halvings, E @ E, E)
+    return E

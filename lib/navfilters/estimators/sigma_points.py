@@ -1,0 +1,132 @@
+"""Where an unscented filter samples its prior, and how it weighs the samples."""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from navfilters.numerics import validation
+from navfilters.numerics.matrix_roots import semidefinite_root, symmetric_root
+from navfilters.types import Array, Gaussian
+
+
+@dataclass(frozen=True)
+class SigmaPoints:
+    """Where an unscented filter samples its prior, and how it weighs the samples.
+
+    Parameters
+    ----------
+    alpha : float or array (...)
+        Spread, larger than 0. An array is one setting per member of the batch.
+    beta : float or array (...)
+        Added to the central covariance weight; 2 is right for a Gaussian.
+    kappa : float or array (...), optional
+        Second spread parameter, larger than -n. By default 3 - n, n being the state's size.
+    root : {"cholesky", "symmetric"}
+        The matrix square root whose columns become the sigma points.
+
+    Raises
+    ------
+    ValueError
+        An unknown root; alpha, beta or kappa not finite numbers; alpha not positive.
+
+    References
+    ----------
+    perea2007, Eq. (21), which leaves all four open; the names are those of its reference 12.
+    """
+
+    alpha: Array = 1.0
+    beta: Array = 2.0
+    kappa: Array | None = None
+    root: Literal["cholesky", "symmetric"] = "cholesky"
+
+    def __post_init__(self) -> None:
+        if self.root not in ROOTS:
+            raise ValueError(f"root must be one of {list(ROOTS)}; found {self.root!r}")
+        for name in ("alpha", "beta") if self.kappa is None else ("alpha", "beta", "kappa"):
+            value = validation.real_array(name, getattr(self, name), "")
+            if name == "alpha" and (value <= 0).any():
+                raise ValueError(f"alpha must be positive; found {value.min()}")
+
+    def weights(self, n: int, xp: Any = None) -> tuple[Array, Array, Array, Array]:
+        """Scaling and weights for a state of size n.
+
+        Parameters
+        ----------
+        n : int
+            Size of the state.
+        xp : array namespace, optional
+            Of the results; NumPy by default.
+
+        Returns
+        -------
+        tuple of array (...)
+            (gamma, W0_m, W0_c, W_i): the scale of the offsets, the central point's weight in means
+            and in covariances, and the weight of each of the 2 n other points.
+        """
+        xp = np if xp is None else xp
+        given = 3.0 - n if self.kappa is None else self.kappa
+        if not validation.traced(given) and np.any(n + np.asarray(given) <= 0):
+            raise ValueError(
+                f"kappa must be larger than {-n} for a state of size {n}; found {given}"
+            )
+        alpha, beta, kappa = (xp.asarray(v, dtype=float) for v in (self.alpha, self.beta, given))
+        scale = alpha**2 * (n + kappa)  # n + lambda
+        W0_m = 1 - n / scale
+        return xp.sqrt(scale), W0_m, W0_m + 1 - alpha**2 + beta, 0.5 / scale
+
+
+ROOTS = ("cholesky", "symmetric")
+
+
+def _root(cov: Array, kind: str) -> tuple[Array, Array | None]:
+    """The root of a covariance whose columns become the points, and what it knows exactly.
+
+    A state or a combination without variance has no points of its own. A covariance that is
+    positive definite has the root that it always had, to the last bit.
+    """
+    S, exact = semidefinite_root(cov)
+    if kind == "symmetric":
+        S = symmetric_root(cov, None if exact is None else _is_singular(exact))
+    return S, exact
+
+
+def _is_singular(exact: Array) -> Array:
+    xp = exact.__array_namespace__()
+    return xp.any(xp.linalg.diagonal(exact) == 0, axis=-1)
+
+
+def sigma_points(prior: Gaussian, points: SigmaPoints) -> Array:
+    """The 2 n + 1 sigma points of a prior: its mean, then mean + and mean - each scaled column.
+
+    Parameters
+    ----------
+    prior : Gaussian
+        mean (..., n), cov (..., n, n).
+    points : SigmaPoints
+        Scaling and square root.
+
+    Returns
+    -------
+    array (2 n + 1, ..., n)
+        The points in *front* of the batch axes, so that a model's own batch axes still line up.
+        NaN, except the mean, where cov has no square root: where it is not positive semidefinite.
+
+    References
+    ----------
+    perea2007, Eq. (21).
+    """
+    return prior.mean + _offsets(prior, points, _root(prior.cov, points.root)[0])
+
+
+def _offsets(prior: Gaussian, points: SigmaPoints, root: Array) -> Array:
+    """What the points have that the mean has not, with all the batch axes of both."""
+    xp = prior.cov.__array_namespace__()
+    n = prior.mean.shape[-1]
+    gamma, *_ = points.weights(n, xp)
+    if gamma.ndim:
+        validation.batch(points=gamma.shape, prior=root.shape[:-2])
+    S = gamma[..., None, None] * root
+    batch = xp.broadcast_shapes(S.shape[:-2], prior.mean.shape[:-1])
+    columns = xp.moveaxis(xp.broadcast_to(S, (*batch, n, n)), -1, 0)
+    return xp.concat([xp.zeros_like(columns[:1]), columns, -columns], axis=0)

@@ -1,1 +1,0 @@
-"""The papers' experiments: constants with units and equation numbers, truth, measurements."""

@@ -1,0 +1,1 @@
+"""Numbers: small matrices in batches, derivatives, and checks of what is given."""

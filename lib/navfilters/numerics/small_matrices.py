@@ -1,0 +1,239 @@
+"""Products, factors and solutions of small matrices, batched: written out where that is faster."""
+
+import numpy as np
+
+from navfilters.types import Array
+
+WRITTEN_OUT = 2
+"""Largest size of the matrices whose products are written out; above, BLAS is as fast."""
+
+
+def matmul(A: Array, B: Array) -> Array:
+    """A B, for each pair of a stack.
+
+    Parameters
+    ----------
+    A : array (..., n, k)
+    B : array (..., k, m)
+
+    Returns
+    -------
+    array (..., n, m)
+
+    Notes
+    -----
+    Up to 2 x 2 the sum of the products of A's columns and B's rows, so that a member's last bits
+    depend neither on the others nor on their number; larger ones are left to ``@``.
+    """
+    k = A.shape[-1]
+    if max(A.shape[-2], k, B.shape[-1]) > WRITTEN_OUT:
+        return A @ B
+    terms = [A[..., i : i + 1] * B[..., i : i + 1, :] for i in range(k)]
+    return sum(terms[1:], start=terms[0])
+
+
+def outer_sum(a: Array, b: Array) -> Array:
+    """sum_i a_i b_i^T, for each pair of two series of stacks of vectors.
+
+    Parameters
+    ----------
+    a : array (k, ..., n)
+    b : array (k, ..., m)
+
+    Returns
+    -------
+    array (..., n, m)
+
+    Notes
+    -----
+    Up to 2 x 2 written out, as in :func:`matmul`.
+    """
+    if max(a.shape[-1], b.shape[-1]) > WRITTEN_OUT:
+        xp = a.__array_namespace__()
+        return xp.moveaxis(a, 0, -1) @ xp.moveaxis(b, 0, -2)
+    terms = [x[..., :, None] * y[..., None, :] for x, y in zip(a, b, strict=True)]
+    return sum(terms[1:], start=terms[0])
+
+
+def vector(elements: list[Array]) -> Array:
+    """A vector over the batch axes, from its elements.
+
+    Parameters
+    ----------
+    elements : list of array (...)
+
+    Returns
+    -------
+    array (..., n)
+        With the members innermost in memory.
+    """
+    xp = elements[0].__array_namespace__()
+    v = xp.stack(elements)
+    return xp.permute_dims(v, (*range(1, v.ndim), 0))
+
+
+def matrix(rows: list[list[Array]]) -> Array:
+    """A matrix over the batch axes, from the rows of its elements.
+
+    Parameters
+    ----------
+    rows : list of list of array (...)
+
+    Returns
+    -------
+    array (..., n, m)
+        With the members innermost in memory.
+    """
+    v = vector([element for row in rows for element in row])
+    return v.__array_namespace__().reshape(v, (*v.shape[:-1], len(rows), len(rows[0])))
+
+
+def cholesky(A: Array) -> Array:
+    """Lower triangular L with A = L L^T, for each matrix of a stack.
+
+    Parameters
+    ----------
+    A : array (..., n, n)
+        Symmetric; only the lower triangle is read.
+
+    Returns
+    -------
+    array (..., n, n)
+        NaN from the first pivot that is not positive, in the members that have none.
+    """
+    xp = A.__array_namespace__()
+    n = A.shape[-1]
+    L = [[xp.zeros_like(A[..., 0, 0])] * n for _ in range(n)]
+    for j in range(n):
+        pivot = A[..., j, j] - sum(L[j][k] ** 2 for k in range(j))
+        L[j][j] = xp.sqrt(xp.where(pivot > 0, pivot, xp.nan))
+        for i in range(j + 1, n):
+            L[i][j] = (A[..., i, j] - sum(L[i][k] * L[j][k] for k in range(j))) / L[j][j]
+    return matrix(L)
+
+
+def _rounding(n: int) -> float:
+    return 8 * n * float(np.finfo(float).eps)
+
+
+def _deferred_cholesky(A: Array) -> tuple[Array, Array, Array]:
+    """S, T and whether they are those of a singular, semidefinite member."""
+    xp, n = A.__array_namespace__(), A.shape[-1]
+    zero = xp.zeros_like(A[..., 0, 0])
+    S = [[zero] * n for _ in range(n)]
+    live: list[Array] = []
+
+    def rest(i, j, done):
+        return A[..., max(i, j), min(i, j)] - sum(S[i][k] * S[j][k] for k in range(done))
+
+    for j in range(n):
+        pivot = rest(j, j, j)
+        live.append(pivot > _rounding(n) * A[..., j, j])
+        S[j][j] = xp.sqrt(xp.where(live[j], pivot, 1.0))
+        for i in range(n):
+            if i != j:
+                follows = live[j] if i > j else live[j] & ~live[i]
+                S[i][j] = xp.where(follows, rest(i, j, j) / S[j][j], 0.0)
+        S[j][j] = xp.where(live[j], S[j][j], 0.0)
+    T = [[xp.where(live[i], 1.0, 0.0) if i == j else zero for j in range(n)] for i in range(n)]
+    for j in reversed(range(n)):
+        pivot = xp.where(live[j], S[j][j], 1.0)
+        for i in range(n):
+            if i != j:
+                of_later = sum(T[i][k] * S[k][j] for k in range(j + 1, n))
+                T[i][j] = xp.where(live[j] & ~live[i], (S[i][j] - of_later) / pivot, 0.0)
+    deviation = [xp.sqrt(xp.where(A[..., i, i] > 0, A[..., i, i], 0.0)) for i in range(n)]
+    reach = [sum(xp.abs(T[i][k]) * deviation[k] for k in range(n)) for i in range(n)]
+    singular = ~xp.all(xp.stack(live), axis=0)
+    for i in range(n):
+        for j in range(i + 1):
+            size = xp.where(reach[i] > deviation[i], reach[i], deviation[i]) * xp.where(
+                reach[j] > deviation[j], reach[j], deviation[j]
+            )
+            small = xp.abs(rest(i, j, n)) <= 8 * _rounding(n) * size
+            singular = singular & (live[i] | live[j] | small)
+    return matrix(S), matrix(T), singular
+
+
+def right_divide(B: Array, A: Array) -> Array:
+    """B A^-1, for each pair of a stack.
+
+    Parameters
+    ----------
+    B : array (..., n, m)
+    A : array (..., m, m)
+        Any invertible matrix. A P_zz need not be definite: the second-order filter subtracts
+        from it.
+
+    Returns
+    -------
+    array (..., n, m)
+        NaN or infinite in the members whose A is singular.
+
+    Notes
+    -----
+    m = 1 divides, m = 2 uses the adjugate, anything larger Gauss-Jordan elimination with the row of
+    the largest pivot, chosen for each member on its own.
+    """
+    m = A.shape[-1]
+    if m == 1:
+        return B / A
+    if m == 2:
+        a, b, c, d = A[..., 0, 0], A[..., 0, 1], A[..., 1, 0], A[..., 1, 1]
+        adjugate = matrix([[d, -b], [-c, a]])
+        return matmul(B, adjugate) / (a * d - b * c)[..., None, None]
+    return _solve(A.mT, B.mT).mT
+
+
+def _solve(A: Array, B: Array) -> Array:
+    """A^-1 B for a stack, by Gauss-Jordan elimination with partial pivoting."""
+    xp, m = A.__array_namespace__(), A.shape[-1]
+    batch = xp.broadcast_shapes(A.shape[:-2], B.shape[:-2])
+    work = xp.concat([xp.broadcast_to(X, (*batch, *X.shape[-2:])) for X in (A, B)], axis=-1)
+    rows = xp.arange(m)
+    for j in range(m):
+        size = xp.where(rows >= j, xp.abs(work[..., :, j]), -1.0)
+        pivot = xp.argmax(size, axis=-1)[..., None]
+        order = xp.where(rows == j, pivot, xp.where(rows == pivot, j, rows))
+        work = xp.take_along_axis(work, order[..., None], axis=-2)
+        row = (work[..., j, :] / work[..., j, j, None])[..., None, :]
+        work = xp.where((rows == j)[:, None], row, work - work[..., :, j, None] * row)
+    return work[..., :, m:]
+
+
+def spectral_norm(A: Array) -> Array:
+    """Largest absolute eigenvalue of symmetric A, for each matrix of a stack.
+
+    Parameters
+    ----------
+    A : array (..., n, n)
+        Symmetric.
+
+    Returns
+    -------
+    array (...)
+        NaN in the members that hold a NaN.
+    """
+    xp = A.__array_namespace__()
+    if A.shape[-1] == 2:
+        a, b, c = A[..., 0, 0], A[..., 0, 1], A[..., 1, 1]
+        return xp.abs(a + c) / 2 + xp.hypot((a - c) / 2, b)
+    finite = xp.all(xp.isfinite(A), axis=(-2, -1))
+    w = xp.linalg.eigvalsh(xp.where(finite[..., None, None], A, xp.eye(A.shape[-1])))
+    return xp.where(finite, xp.max(xp.abs(w), axis=-1), xp.nan)
+
+
+def is_positive_definite(A: Array) -> Array:
+    """Whether each matrix of a stack has a Cholesky factor.
+
+    Parameters
+    ----------
+    A : array (..., n, n)
+        Symmetric.
+
+    Returns
+    -------
+    bool array (...)
+    """
+    xp = A.__array_namespace__()
+    return xp.all(xp.isfinite(cholesky(A)), axis=(-2, -1))

@@ -1,0 +1,50 @@
+"""Matrices of two by two, written out in plain Python numbers."""
+
+try:
+    from mpmath import mp, mpf
+except ImportError:
+    raise ImportError("this oracle needs mpmath: pip install navfilters[book]") from None
+
+
+# --- 2x2 algebra -------------------------------------------------------------------------------
+
+
+def add(a, b, factor=1):
+    """The symmetric matrix a + factor * b."""
+    return tuple(u + factor * v for u, v in zip(a, b, strict=True))
+
+
+def outer(b):
+    """The symmetric matrix b b^T."""
+    return b[0] * b[0], b[0] * b[1], b[1] * b[1]
+
+
+def is_positive_definite(p):
+    """Both leading minors are positive."""
+    p11, p12, p22 = p
+    return p11 > 0 and p11 * p22 - p12 * p12 > 0
+
+
+def spectral_norm(p):
+    """Largest absolute eigenvalue of a symmetric matrix: |mean| + radius."""
+    p11, p12, p22 = p
+    radius = mp.sqrt(((p11 - p22) / 2) ** 2 + p12 * p12)
+    return abs((p11 + p22) / 2) + radius
+
+
+def square_root(p, root):
+    """The two columns of a square root of P, for Eq. (21).
+
+    "cholesky" is the lower factor; "symmetric" is the principal root
+    (P + s I) / sqrt(trace P + 2 s) with s = sqrt(det P).
+    """
+    p11, p12, p22 = p
+    if root == "cholesky":
+        l11 = mp.sqrt(p11)
+        l21 = p12 / l11
+        return (l11, l21), (mpf(0), mp.sqrt(p22 - l21 * l21))
+    if root == "symmetric":
+        s = mp.sqrt(p11 * p22 - p12 * p12)
+        t = mp.sqrt(p11 + p22 + 2 * s)
+        return ((p11 + s) / t, p12 / t), (p12 / t, (p22 + s) / t)
+    raise ValueError(f"root is 'cholesky' or 'symmetric', not {root!r}")

@@ -1,0 +1,1 @@
+"""The four works: one package each, with a command each."""

@@ -1,0 +1,10 @@
+"""Perea, How, Breger and Elosegui (2007): range and bearing of a fixed point."""
+
+from navfilters.papers.perea2007.experiment import Setup, improvement, isotropic, position_error
+
+__all__ = [
+    "Setup",
+    "improvement",
+    "isotropic",
+    "position_error",
+]

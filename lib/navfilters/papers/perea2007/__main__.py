@@ -1,0 +1,93 @@
+"""Compute and draw every map: ``python -m navfilters.papers.perea2007 --size 256``."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from navfilters.estimators.filter import FILTERS
+from navfilters.numerics.extras import command, needed
+from navfilters.papers.perea2007.divergence_maps import (
+    AXES,
+    noises,
+    over_noises,
+    over_starts,
+    relative_change,
+    starts,
+)
+from navfilters.papers.perea2007.experiment import Setup
+from navfilters.types import Array
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Compute and draw every map.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Those of the command line by default.
+    """
+    parser = argparse.ArgumentParser(description="Divergence maps of the ten filters.")
+    parser.add_argument("--size", type=int, default=256, help="points in each direction")
+    parser.add_argument("--engine", choices=("numpy", "jax"), default="numpy")
+    parser.add_argument("--steps", type=int, default=Setup.steps, help="number of updates")
+    parser.add_argument("--out", default="divergence-maps", help="beginning of the files' names")
+    chosen = parser.parse_args(arguments)
+    if chosen.size < 2 or chosen.steps < 1:
+        parser.error(
+            f"--size must be at least 2 and --steps at least 1; found {chosen.size}, {chosen.steps}"
+        )
+    needed("matplotlib", "navfilters[book]", "a picture of the maps")  # not only after all the work
+    options = {"steps": chosen.steps, "engine": chosen.engine, "workers": None, "progress": True}
+    found = {}
+    for name in FILTERS:
+        for label, compute in (("starts", over_starts), ("noises", over_noises)):
+            for changed in (False, True):
+                key = f"{label}{' changed' * changed}/{name}"
+                found[key] = compute(name, chosen.size, changed=changed, **options)
+        sys.stdout.write(f"{name}: {np.mean(~(found[f'starts/{name}'] <= 0.1)):.1%} above 0.1\n")
+    Path(chosen.out).parent.mkdir(parents=True, exist_ok=True)
+    np.savez_compressed(f"{chosen.out}.npz", **{k.replace("/", " "): v for k, v in found.items()})
+    for path in _draw(found, chosen.size, chosen.out):
+        sys.stdout.write(f"{path}\n")
+
+
+def _draw(found: dict[str, Array], size: int, out: str) -> list[str]:
+    """Four pictures: I and its change by the last bit, over the starts and over the noises."""
+    import matplotlib.pyplot as plt
+
+    from navfilters.book import plotting
+
+    plotting.use_style()
+    setup, points = Setup(), starts(size)
+    ratio = (setup.range_variance / setup.bearing_variance) ** 0.5
+    planes = {
+        "starts": (points[0, :, 0], points[:, 0, 1], setup.x0),
+        "noises": (
+            *noises(size),
+            (setup.sigma, ratio),
+        ),
+    }
+    paths = []
+    for label, (x, y, start) in planes.items():
+        I = {name: found[f"{label}/{name}"] for name in FILTERS}
+        change = {n: relative_change(I[n], found[f"{label} changed/{n}"]) for n in FILTERS}
+        for kind, maps, limits, text in (
+            ("", I, (1e-6, 1.0), "improvement I"),
+            ("-last-bit", change, (1e-15, 1.0), "relative change of I"),
+        ):
+            figure, axes = plotting.map_panels(
+                x, y, maps, text, limits, labels=AXES[label], log=label == "noises"
+            )
+            for ax in axes:
+                ax.plot(*start, "+", color="black")
+            paths.append(f"{out}-{label}{kind}.png")
+            figure.savefig(paths[-1], dpi=200)
+            plt.close(figure)
+    return paths
+
+
+if __name__ == "__main__":
+    command(main)

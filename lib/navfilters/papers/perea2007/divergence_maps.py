@@ -1,0 +1,194 @@
+"""Where the filters of Perea et al. fail: I of Eq. (27) over first estimates and over noises."""
+
+from typing import Any, Literal
+
+import numpy as np
+
+from navfilters.estimators.filter import FILTERS
+from navfilters.models import RangeBearing
+from navfilters.papers.perea2007.experiment import Setup, isotropic, position_error
+from navfilters.runs.sweeping import sweep
+from navfilters.types import Array, Gaussian
+
+WINDOW = (-200.0, 400.0)
+"""First estimates, units, in both directions: within 300 units of the truth, or 3 sigma."""
+
+DEVIATIONS = (1.0, 1e6)
+"""sigma of the first estimate, units."""
+
+RATIOS = (1e-3, 1e4)
+"""sigma_r / sigma_theta, units per radian; the bearing's noise is the paper's."""
+
+
+def starts(size: int) -> Array:
+    """First estimates on a square lattice around the truth.
+
+    Parameters
+    ----------
+    size : int
+        Points in each direction.
+
+    Returns
+    -------
+    array (size, size, 2)
+        Rows are x2, columns x1. The two are offset by a quarter of a cell, so that no point lies on
+        the line of sight to the truth, x1 = x2, or on the jump of the bearing, x2 = 0: lines
+        without width, which a lattice must not paint one cell wide.
+    """
+    low, high = WINDOW
+    cell = (high - low) / size
+    x1, x2 = (low + cell * (np.arange(size) + offset) for offset in (0.5, 0.25))
+    return np.stack(np.meshgrid(x1, x2), axis=-1)
+
+
+def noises(size: int) -> tuple[Array, Array]:
+    """Deviations of the first estimate and noise ratios, both in geometric steps.
+
+    Parameters
+    ----------
+    size : int
+        Points in each direction.
+
+    Returns
+    -------
+    tuple of array (size,)
+        sigma, units, and sigma_r / sigma_theta, units per radian.
+    """
+    return np.geomspace(*DEVIATIONS, size), np.geomspace(*RATIOS, size)
+
+
+def next_bit(mean: Any) -> Array:
+    """The next larger floating-point number, in every component.
+
+    Parameters
+    ----------
+    mean : array-like (..., n)
+
+    Returns
+    -------
+    array (..., n)
+    """
+    return np.nextafter(np.asarray(mean, float), np.inf)
+
+
+def indicator(
+    name: str,
+    mean: Any,
+    sigma: Any = Setup.sigma,
+    R: Any = None,
+    steps: int = Setup.steps,
+    *,
+    engine: Literal["numpy", "jax"] = "numpy",
+    workers: int | None = 1,
+    progress: bool = False,
+) -> Array:
+    """I of one filter: the last error over the first.
+
+    Parameters
+    ----------
+    name : str
+        A key of ``FILTERS``.
+    mean : array-like (..., 2)
+        First estimate, units.
+    sigma : array-like (...)
+        Its deviation in each direction, units.
+    R : array (..., 2, 2), optional
+        Covariance of the noise; the paper's by default.
+    steps : int
+    engine, workers, progress
+        Those of ``navfilters.sweep``.
+
+    Returns
+    -------
+    array (...)
+        NaN where the filter cannot go on.
+
+    References
+    ----------
+    perea2007, Eq. (27).
+    """
+    setup, mean = Setup(), np.asarray(mean, float)
+    shape = np.broadcast_shapes(mean.shape[:-1], np.shape(sigma))
+    priors = isotropic(np.broadcast_to(mean, (*shape, 2)), np.broadcast_to(sigma, shape))
+    end: Gaussian = sweep(
+        FILTERS[name],
+        priors,
+        setup.z,
+        setup.model if R is None else RangeBearing(R),
+        steps,
+        engine=engine,
+        workers=workers,
+        progress=progress,
+    ).final
+    return position_error(end.mean, setup.x_true) / position_error(mean, setup.x_true)
+
+
+def over_starts(name: str, size: int, *, changed: bool = False, **options: Any) -> Array:
+    """I over the plane of first estimates.
+
+    Parameters
+    ----------
+    name : str
+    size : int
+    changed : bool
+        Whether the first estimates are changed in their last bit.
+    **options
+        Those of ``indicator``.
+
+    Returns
+    -------
+    array (size, size)
+    """
+    mean = starts(size)
+    return indicator(name, next_bit(mean) if changed else mean, **options)
+
+
+def over_noises(name: str, size: int, *, changed: bool = False, **options: Any) -> Array:
+    """I from the paper's first estimate, over its deviation and the ratio of the noises.
+
+    Parameters
+    ----------
+    name : str
+    size : int
+    changed : bool
+        Whether the first estimate is changed in its last bit.
+    **options
+        Those of ``indicator``.
+
+    Returns
+    -------
+    array (size, size)
+        Rows are ratios, columns deviations.
+    """
+    setup, (sigma, ratio) = Setup(), noises(size)
+    R = np.zeros((size, 1, 2, 2))
+    R[..., 1, 1] = setup.bearing_variance
+    R[:, 0, 0, 0] = setup.bearing_variance * ratio**2
+    mean = np.asarray(setup.x0)
+    return indicator(name, next_bit(mean) if changed else mean, sigma, R, **options)
+
+
+def relative_change(I: Any, changed: Any) -> Array:
+    """Relative change of I, at least one unit of the last place; NaN where either is.
+
+    Parameters
+    ----------
+    I, changed : array-like (...)
+
+    Returns
+    -------
+    array (...)
+    """
+    I, changed = np.asarray(I, float), np.asarray(changed, float)
+    floor = np.finfo(float).tiny
+    return np.maximum(np.abs(changed - I) / np.maximum(I, floor), np.finfo(float).eps)
+
+
+AXES = {
+    "starts": ("first estimate, $x_1$ (units)", "first estimate, $x_2$ (units)"),
+    "noises": (
+        "deviation of the first estimate (units)",
+        r"$\sigma_r / \sigma_\theta$ (units per radian)",
+    ),
+}
+"""What the axes of a map of first estimates, and of one of noises, say."""

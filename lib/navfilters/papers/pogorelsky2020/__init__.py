@@ -1,0 +1,124 @@
+"""Pogorelsky et al. (2020): navigation by SAR images of known terrain."""
+
+from navfilters.papers.pogorelsky2020.acquisition import acquire, measure_directly
+from navfilters.papers.pogorelsky2020.campaign import (
+    ACQUIRING,
+    CLIMBING,
+    Agreement,
+    Campaign,
+    campaign_report,
+    run_campaign,
+)
+from navfilters.papers.pogorelsky2020.campaign_store import Folder, Formed
+from navfilters.papers.pogorelsky2020.closed_loop import (
+    UPDATES,
+    Attempt,
+    Images,
+    closed_table,
+    monte_carlo_closed,
+    summary,
+)
+from navfilters.papers.pogorelsky2020.experiment import (
+    CASES,
+    NOMINAL,
+    NOT_NEGATIVE,
+    PAPER,
+    Setup,
+    of_case,
+)
+from navfilters.papers.pogorelsky2020.image_tables import (
+    ImageTable,
+    assumed_speeds,
+    image_table,
+    tabulate,
+)
+from navfilters.papers.pogorelsky2020.imaging import (
+    FULL,
+    OF_THE_FILTER,
+    Acquisition,
+    Imaging,
+    same_images,
+)
+from navfilters.papers.pogorelsky2020.noise_draws import Noise, misalignment, noise
+from navfilters.papers.pogorelsky2020.open_loop import (
+    MonteCarlo,
+    SimulatedImages,
+    monte_carlo,
+    open_table,
+)
+from navfilters.papers.pogorelsky2020.real_flight import (
+    MISSING,
+    first_lines,
+    fitted,
+    flight_through,
+    lines_between,
+)
+from navfilters.papers.pogorelsky2020.real_images import RealAttempt, RealImages
+from navfilters.papers.pogorelsky2020.real_loop import (
+    Outcome,
+    real_table,
+    report,
+    run_filter,
+    true_flight,
+)
+from navfilters.papers.pogorelsky2020.real_patches import MARGIN, Patch, cut_patches
+from navfilters.papers.pogorelsky2020.true_flight import Truth, initial_state, truth
+
+__all__ = [
+    "ACQUIRING",
+    "CASES",
+    "CLIMBING",
+    "FULL",
+    "MARGIN",
+    "MISSING",
+    "NOMINAL",
+    "NOT_NEGATIVE",
+    "OF_THE_FILTER",
+    "PAPER",
+    "UPDATES",
+    "Acquisition",
+    "Agreement",
+    "Attempt",
+    "Campaign",
+    "Folder",
+    "Formed",
+    "ImageTable",
+    "Images",
+    "Imaging",
+    "MonteCarlo",
+    "Noise",
+    "Outcome",
+    "Patch",
+    "RealAttempt",
+    "RealImages",
+    "Setup",
+    "SimulatedImages",
+    "Truth",
+    "acquire",
+    "assumed_speeds",
+    "campaign_report",
+    "closed_table",
+    "cut_patches",
+    "first_lines",
+    "fitted",
+    "flight_through",
+    "image_table",
+    "initial_state",
+    "lines_between",
+    "measure_directly",
+    "misalignment",
+    "monte_carlo",
+    "monte_carlo_closed",
+    "noise",
+    "of_case",
+    "open_table",
+    "real_table",
+    "report",
+    "run_campaign",
+    "run_filter",
+    "same_images",
+    "summary",
+    "tabulate",
+    "true_flight",
+    "truth",
+]

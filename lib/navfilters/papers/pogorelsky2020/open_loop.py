@@ -1,0 +1,234 @@
+"""The open loop of Pogorelsky et al.: measurements with simulated errors."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from navfilters.estimators.multiplicative import MekfState, MekfUpdate, mekf_update
+from navfilters.numerics import validation
+from navfilters.papers.pogorelsky2020.experiment import PAPER, Setup, of_case
+from navfilters.papers.pogorelsky2020.noise_draws import Noise, misalignment, noise
+from navfilters.papers.pogorelsky2020.true_flight import Truth, truth
+from navfilters.runs.consistency import mean_nees, sample_deviation
+from navfilters.space.frames import east_north_up, ellipsoid_intersection
+from navfilters.space.image_measurement import Measurement
+from navfilters.space.quaternions import conjugate, from_rotation_vector, product, rotation_vector
+from navfilters.types import Array
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedImages:
+    """Measurements with simulated errors: what stands in for images in the open loop.
+
+    Parameters
+    ----------
+    setup : Setup
+    flight : Truth
+    q_mu : array (runs, k + 1, 4)
+        True misalignment.
+    noise : Noise
+
+    References
+    ----------
+    pogorelsky2020, section "Open-loop trajectory".
+    """
+
+    setup: Setup
+    flight: Truth
+    q_mu: Array
+    noise: Noise
+
+    def __call__(self, k: int, state: MekfState) -> Measurement:
+        """The image after interval k; it does not depend on the state, a focused one would.
+
+        Parameters
+        ----------
+        k : int
+            From 1.
+        state : MekfState
+            What the filter predicts.
+
+        Returns
+        -------
+        Measurement
+            r_f (runs, 3), slant_range (runs,), speed (runs,).
+        """
+        setup, x = self.setup, self.flight.x[k]
+        model = replace(setup.geometry, T_e_b=self.flight.T_e_b[k])
+        r_f = ellipsoid_intersection(x[:3], model.boresight(self.q_mu[:, k]))
+        slant_range = np.linalg.norm(r_f - x[:3], axis=-1)
+        local = np.asarray(setup.pixel) * self.noise.pixel[:, k - 1]
+        # one product per row, not one of matrices: a run's digits must not depend on the batch
+        shift = np.sum(local[:, :, None] * east_north_up(*setup.target), axis=1)
+        return Measurement(
+            r_f + shift,
+            slant_range + setup.sigma_range * self.noise.slant_range[:, k - 1],
+            np.linalg.norm(x[3:]) + setup.sigma_speed * self.noise.speed[:, k - 1],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class MonteCarlo:
+    """What the runs of one case gave.
+
+    Parameters
+    ----------
+    times : array (t,)
+        0, after each update, and the end of a coast, s.
+    errors : array (runs, t, 9)
+        Truth minus estimate: position, m, velocity, m/s, misalignment as a rotation vector, rad.
+    covariances : array (runs, t, 9, 9)
+        What the filter believed of them.
+    innovations : array (runs, updates, 4)
+        Measured minus expected; NaN where there was no measurement.
+    S : array (runs, updates, 4, 4)
+        What the filter believed of them, underweighting included.
+    """
+
+    times: Array
+    errors: Array
+    covariances: Array
+    innovations: Array
+    S: Array
+
+
+def monte_carlo(
+    case: str | Setup = "TC-1",
+    updates: int = 72,
+    runs: int | Sequence[int] = 100,
+    seed: int = 0,
+    *,
+    flight: Truth | None = None,
+    measure: Callable[[int, MekfState], Measurement] | None = None,
+    update: Callable[..., MekfUpdate] = mekf_update,
+    progress: Callable[[Iterable], Iterable] = iter,
+) -> MonteCarlo:
+    """All runs of a test case in one batch.
+
+    The true flight is the same in every run and its antenna starts without misalignment; drawn are
+    the first *estimates*, so that all runs see the same ground, the measurements' errors, and the
+    small random walk of the true misalignment.
+
+    Parameters
+    ----------
+    case : {"TC-1", "TC-2"} or Setup
+        A key of ``CASES``, or any set-up.
+    updates : int
+        72 for 600 s; with 3, at 8.33, 16.67 and 25 s, the filter coasts until 41.67 s.
+    runs : int or sequence of int
+        How many, or which: see ``noise``.
+    seed : int
+    flight : Truth, optional
+        Another than that of the set-up, which is the default: of as many intervals, at least
+        ``updates``, as it is to last.
+    measure : callable, optional
+        (k, predicted state) -> Measurement of update k, from 1; by default ``SimulatedImages``. A
+        NaN in it is an image that was not matched.
+    update : callable
+        Called as ``mekf_update`` is.
+    progress : callable
+        Wraps the iterable of intervals.
+
+    Returns
+    -------
+    MonteCarlo
+
+    Raises
+    ------
+    ValueError
+        An unknown case, bad counts, a flight of fewer intervals than updates, or a set-up whose
+        beam leaves the Earth.
+
+    References
+    ----------
+    pogorelsky2020, Figs. 8 to 11.
+    """
+    setup = of_case(case)
+    validation.whole_number("updates", updates, 1)
+    if flight is None:
+        flight = truth(setup, max(updates, setup.shortest))
+    intervals = len(flight.times) - 1
+    if intervals < updates:
+        raise ValueError(f"flight must last {updates} intervals, one an update; found {intervals}")
+    drawn = noise(runs, intervals, seed)
+    q_true = misalignment(setup, drawn.walk)
+    measure = SimulatedImages(setup, flight, q_true, drawn) if measure is None else measure
+    state = _first_estimate(setup, flight.x[0], q_true[:, 0], drawn.first)
+    orbit, geometry, after = setup.orbit, setup.geometry, [(0, state)]
+    made: list[MekfUpdate] = []
+    for k in progress(range(1, intervals + 1)):
+        x = np.concatenate([state.r, state.v], axis=-1)
+        x, P = orbit.propagate(x, state.P, setup.steps)
+        state = MekfState(x[..., :3], x[..., 3:], state.q_mu, P)
+        if k <= updates:
+            made.append(
+                update(
+                    state,
+                    measure(k, state),
+                    replace(geometry, T_e_b=flight.T_e_b[k]),
+                    underweighting=setup.underweighting if k <= setup.underweighted else 0.0,
+                    gamma=setup.gamma,
+                )
+            )
+            state = made[-1].state
+        if k <= updates or k == intervals:
+            after.append((k, state))
+    errors = [_error(flight.x[k], q_true[:, k], state) for k, state in after]
+    return MonteCarlo(
+        flight.times[[k for k, _ in after]],
+        np.stack(errors, axis=1),
+        np.stack([state.P for _, state in after], axis=1),
+        np.stack([each.innovation for each in made], axis=1),
+        np.stack([each.S for each in made], axis=1),
+    )
+
+
+def _first_estimate(setup: Setup, x: Array, q_mu: Array, drawn: Array) -> MekfState:
+    """The truth without a drawn error, so that truth minus estimate is that error exactly."""
+    error = np.sqrt(np.diag(setup.P0)) * drawn
+    q = product(from_rotation_vector(-error[:, 6:]), q_mu)
+    P = np.broadcast_to(setup.P0, (len(drawn), 9, 9))
+    return MekfState(x[:3] - error[:, :3], x[3:] - error[:, 3:6], q, P)
+
+
+def _error(x: Array, q_mu: Array, state: MekfState) -> Array:
+    """Truth minus estimate, (runs, 9)."""
+    turned = rotation_vector(product(q_mu, conjugate(state.q_mu)))
+    return np.concatenate([x[:3] - state.r, x[3:] - state.v, turned], axis=-1)
+
+
+def open_table(
+    case: str = "TC-1", runs: int = 100, seed: int = 0, progress: Callable = iter
+) -> str:
+    """Position at 600 s beside the paper's: deviations, how far they fell, and the NEES.
+
+    Parameters
+    ----------
+    case : {"TC-1", "TC-2"}
+    runs : int
+        At least 2.
+    seed : int
+    progress : callable
+        Wraps the iterable of intervals.
+
+    Returns
+    -------
+    str
+    """
+    result = monte_carlo(case, runs=runs, seed=seed, progress=progress)
+    first = of_case(case).sigma_r
+    spread = sample_deviation(result.errors[:, -1], result.covariances[:, -1])
+    total = mean_nees(result.errors[:, -1], result.covariances[:, -1])
+    lines = [f"{'':6}{'predicted':>11}{'sample (95 %)':>25}{'fell by':>10}{'paper':>18}"]
+    for i, axis in enumerate("xyz"):
+        low, sample, high = (f"{s[i]:.1f}" for s in (spread.low, spread.sample, spread.high))
+        fell = 100 * (1 - spread.predicted[i] / first)
+        paper = "{:.0f} m, {} %".format(*PAPER[case][axis]) if axis in PAPER[case] else "-"
+        lines.append(
+            f"{axis} (m) {spread.predicted[i]:11.1f}{f'{sample} ({low} to {high})':>25}"
+            f"{fell:8.1f} %{paper:>18}"
+        )
+    band = f"{total.low:.1f} to {total.high:.1f}"
+    lines.append(f"NEES  {total.mean:11.1f}{f'consistent: {band}':>25}")
+    return "\n".join(lines)

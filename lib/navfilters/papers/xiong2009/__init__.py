@@ -1,0 +1,52 @@
+"""Xiong, Zhang and Liu (2009): adaptive robust filters through orbit manoeuvres."""
+
+from navfilters.papers.xiong2009.attenuation import (
+    attenuation_ratio,
+    gamma_limits,
+    real_covariance,
+    smallest_lambda,
+)
+from navfilters.papers.xiong2009.cramer_rao import cramer_rao_bound
+from navfilters.papers.xiong2009.error_bounds import (
+    Assumptions,
+    assumptions,
+    contraction,
+    lemma_bound,
+    theorem_bound,
+    theorem_constants,
+)
+from navfilters.papers.xiong2009.experiment import ARCSECOND, ESTIMATORS, VARIANTS, Estimator, Setup
+from navfilters.papers.xiong2009.monte_carlo import (
+    errors,
+    noise,
+    position_errors,
+    rms_error,
+    root_mean_square,
+)
+from navfilters.papers.xiong2009.true_flight import Truth, truth
+
+__all__ = [
+    "ARCSECOND",
+    "ESTIMATORS",
+    "VARIANTS",
+    "Assumptions",
+    "Estimator",
+    "Setup",
+    "Truth",
+    "assumptions",
+    "attenuation_ratio",
+    "contraction",
+    "cramer_rao_bound",
+    "errors",
+    "gamma_limits",
+    "lemma_bound",
+    "noise",
+    "position_errors",
+    "real_covariance",
+    "rms_error",
+    "root_mean_square",
+    "smallest_lambda",
+    "theorem_bound",
+    "theorem_constants",
+    "truth",
+]

@@ -1,0 +1,61 @@
+"""Table 1: ``python -m navfilters.papers.xiong2009 --variant B --seeds 20``."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from navfilters.numerics.extras import command
+from navfilters.papers.xiong2009.experiment import ESTIMATORS, VARIANTS
+from navfilters.papers.xiong2009.monte_carlo import rms_error
+from navfilters.runs.progress import progress as progress_bar
+
+
+def table(variant: str = "A", seeds: Sequence[int] = range(20), **options: Any) -> str:
+    """Table 1 beside the paper's: median and range over seeds, of each filter, m.
+
+    Parameters
+    ----------
+    variant : {"A", "B", "C"}
+    seeds : sequence of int
+    **options
+        Those of ``rms_error``.
+
+    Returns
+    -------
+    str
+        One line for each filter and each of its two sources.
+    """
+    lines = [f"{'':17}{'':10}" + "".join(f"{f'sigma_{i} (m)':>15}" for i in "xyzp")]
+    for name, estimator in ESTIMATORS.items():
+        ours = rms_error(name, variant, seeds, **options)
+        rows = {"median": np.median(ours, axis=0), "least": ours.min(axis=0)}
+        rows |= {"largest": ours.max(axis=0), "paper": estimator.paper}
+        for i, (label, row) in enumerate(rows.items()):
+            numbers = "".join("-".rjust(15) if np.isnan(x) else f"{x:15.4g}" for x in row)
+            lines.append(f"{'' if i else name:17}{label:10}{numbers}")
+    return "\n".join(lines)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print Table 1.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Those of the command line by default.
+    """
+    parser = argparse.ArgumentParser(description="Table 1 of Xiong, Zhang and Liu (2009).")
+    parser.add_argument("--variant", choices=sorted(VARIANTS), default="A", help="noise reading")
+    parser.add_argument("--seeds", type=int, default=20, help="number of runs")
+    chosen = parser.parse_args(arguments)
+    if chosen.seeds < 1:
+        parser.error(f"--seeds must be at least 1; found {chosen.seeds}")
+    text = table(chosen.variant, range(chosen.seeds), progress=progress_bar)
+    sys.stdout.write(f"variant {chosen.variant}, {chosen.seeds} seeds\n{text}\n")
+
+
+if __name__ == "__main__":
+    command(main)

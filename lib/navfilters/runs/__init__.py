@@ -1,0 +1,1 @@
+"""Runs: one history, or many configurations, on either engine; and tests of consistency."""

@@ -1,0 +1,294 @@
+"""Whether a filter's errors are as large as it believes: tests over Monte Carlo runs.
+
+Errors are (runs, ..., n) with their covariances (runs, ..., n, n); the first axis is that of the
+independent runs, any others, such as time, are kept. Runs that are not finite are left out, and
+how many were used is part of the result. These functions are for the host: NumPy and scipy.stats.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from navfilters.numerics import validation
+from navfilters.numerics.small_matrices import cholesky
+
+
+def nees(error: Any, cov: Any) -> np.ndarray:
+    """Normalised estimation error squared, e^T P^-1 e.
+
+    Parameters
+    ----------
+    error : array (..., n)
+        Truth minus estimate.
+    cov : array (..., n, n)
+        The covariance that the filter gave it.
+
+    Returns
+    -------
+    ndarray (...)
+        Chi-square of n degrees of freedom for a consistent filter: n on average. NaN where either
+        is not finite or the covariance is not positive definite.
+
+    Notes
+    -----
+    e^T P^-1 e = w^T w with L w = e, by the Cholesky factor of P scaled to a unit diagonal, since
+    metres stand beside microradians.
+    """
+    error = validation.real_array("error", error, "n", finite=False)
+    cov = validation.real_array("cov", cov, "n, n", finite=False)
+    validation.core("cov", cov, error.shape[-1:] * 2)
+    variance = np.diagonal(cov, axis1=-2, axis2=-1)
+    scale = 1 / np.sqrt(np.where(variance > 0, variance, np.nan))
+    L = cholesky(scale[..., :, None] * cov * scale[..., None, :])
+    e, w = scale * error, list[np.ndarray]()
+    for i in range(e.shape[-1]):
+        w.append((e[..., i] - sum(L[..., i, j] * w[j] for j in range(i))) / L[..., i, i])
+    return sum(x * x for x in w)
+
+
+def nis(innovation: Any, S: Any) -> np.ndarray:
+    """Normalised innovation squared, y^T S^-1 y.
+
+    Parameters
+    ----------
+    innovation : array (..., m)
+        Measured minus expected.
+    S : array (..., m, m)
+        The covariance that the filter gave it. One that was enlarged by underweighting makes the
+        NIS smaller than m on average, even in a consistent filter.
+
+    Returns
+    -------
+    ndarray (...)
+        As for :func:`nees`, with m degrees of freedom; NaN where there was no measurement.
+    """
+    return nees(innovation, S)
+
+
+def chi_square_band(dof: int, runs: Any = 1, confidence: float = 0.95) -> tuple[Any, Any]:
+    """Where the average over runs of a chi-square variable lies.
+
+    Parameters
+    ----------
+    dof : int
+        Degrees of freedom of each.
+    runs : int or int array (...)
+        How many are averaged.
+    confidence : float
+        Probability of the band, half of the rest on each side.
+
+    Returns
+    -------
+    tuple of float or array (...)
+        Lower and upper end.
+
+    Raises
+    ------
+    ValueError
+        A confidence that is not between 0 and 1, or fewer than one run or degree of freedom.
+    """
+    tail = _tail(confidence)
+    one, many = validation.number("dof", dof), validation.real_array("runs", runs, "")
+    if one < 1 or np.any(many < 1):
+        raise ValueError(f"dof and runs must be at least 1; found {dof} and {np.min(runs)}")
+    total = one * many
+    return tuple(stats.chi2.ppf(p, total) / many for p in (tail, 1 - tail))
+
+
+class MeanNees(NamedTuple):
+    """The average of a normalised square over runs, and the band of a consistent filter.
+
+    Parameters
+    ----------
+    mean : ndarray (...)
+    low, high : ndarray (...)
+        The band in which it lies with the stated confidence.
+    runs : int ndarray (...)
+        How many runs were averaged.
+    """
+
+    mean: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    runs: np.ndarray
+
+
+def mean_nees(error: Any, cov: Any, confidence: float = 0.95) -> MeanNees:
+    """NEES, or NIS, averaged over the runs.
+
+    Parameters
+    ----------
+    error : array (runs, ..., n)
+        Errors, or innovations.
+    cov : array (runs, ..., n, n)
+    confidence : float
+
+    Returns
+    -------
+    MeanNees
+
+    Raises
+    ------
+    ValueError
+        No finite run, a confidence that is not between 0 and 1, or arrays that do not fit.
+
+    Notes
+    -----
+    The average weighs every direction of the error by what the filter believes of it. It finds the
+    combinations of states that are wrong although each state by itself looks right.
+    """
+    error, cov = _runs(error, cov)
+    each = nees(error, cov)
+    runs = _counted(np.isfinite(each), 1)
+    low, high = chi_square_band(error.shape[-1], runs, confidence)
+    return MeanNees(np.nansum(each, axis=0) / runs, low, high, runs)
+
+
+class SampleDeviation(NamedTuple):
+    """The spread of the errors over runs beside the spread that the filter predicts.
+
+    Parameters
+    ----------
+    mean : ndarray (..., n)
+        Average error.
+    sample : ndarray (..., n)
+        Standard deviation of the errors about their mean.
+    low, high : ndarray (..., n)
+        Confidence interval of the deviation that the errors were drawn from.
+    predicted : ndarray (..., n)
+        Root of the average of the filter's variances over the same runs.
+    runs : int ndarray (...)
+        How many runs were used.
+    """
+
+    mean: np.ndarray
+    sample: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    predicted: np.ndarray
+    runs: np.ndarray
+
+
+def sample_deviation(error: Any, cov: Any, confidence: float = 0.95) -> SampleDeviation:
+    """Sample against predicted deviation of each component.
+
+    Parameters
+    ----------
+    error : array (runs, ..., n)
+    cov : array (runs, ..., n, n)
+    confidence : float
+        Of each interval by itself: (k - 1) s^2 / sigma^2 is chi-square of k - 1 degrees of freedom.
+
+    Returns
+    -------
+    SampleDeviation
+
+    Raises
+    ------
+    ValueError
+        Fewer than two finite runs, a confidence not between 0 and 1, or arrays that do not fit.
+
+    References
+    ----------
+    pogorelsky2020, section "Monte Carlo results", which compares the two without intervals.
+    """
+    tail = _tail(confidence)
+    error, cov = _runs(error, cov)
+    used = np.isfinite(error).all(-1) & np.isfinite(cov).all((-2, -1))
+    runs = _counted(used, 2)
+    k, keep = runs[..., None], used[..., None]
+    mean = np.sum(np.where(keep, error, 0.0), axis=0) / k
+    sample = np.sqrt(np.sum(np.where(keep, error - mean, 0.0) ** 2, axis=0) / (k - 1))
+    variance = np.where(keep, np.diagonal(cov, axis1=-2, axis2=-1), 0.0)
+    low, high = (sample * np.sqrt((k - 1) / stats.chi2.ppf(p, k - 1)) for p in (1 - tail, tail))
+    return SampleDeviation(mean, sample, low, high, np.sqrt(np.sum(variance, axis=0) / k), runs)
+
+
+class Coverage(NamedTuple):
+    """How many runs lie within k predicted deviations.
+
+    Parameters
+    ----------
+    fraction : ndarray (..., n)
+    low, high : ndarray (..., n)
+        Confidence interval of the probability behind it.
+    expected : float
+        That of a consistent, Gaussian error.
+    runs : int ndarray (...)
+        How many runs were used.
+    """
+
+    fraction: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    expected: float
+    runs: np.ndarray
+
+
+def coverage(error: Any, cov: Any, k: float = 3.0, confidence: float = 0.95) -> Coverage:
+    """Fraction of runs in which each component is within k predicted deviations.
+
+    Parameters
+    ----------
+    error : array (runs, ..., n)
+    cov : array (runs, ..., n, n)
+    k : float
+        How many deviations.
+    confidence : float
+        Of each interval by itself, at least, after Clopper and Pearson.
+
+    Returns
+    -------
+    Coverage
+
+    Raises
+    ------
+    ValueError
+        A k that is not positive, no finite run, a confidence not between 0 and 1, or arrays that do
+        not fit.
+    """
+    tail = _tail(confidence)
+    k = validation.number("k", k)
+    if k <= 0:
+        raise ValueError(f"k must be a positive number of deviations; found {k}")
+    error, cov = _runs(error, cov)
+    used = np.isfinite(error).all(-1) & np.isfinite(cov).all((-2, -1))
+    runs = _counted(used, 1)
+    n = runs[..., None]
+    variance = np.diagonal(cov, axis1=-2, axis2=-1)
+    hits = np.sum(used[..., None] & (error**2 <= k * k * variance), axis=0)
+    low = np.where(hits > 0, stats.beta.ppf(tail, np.maximum(hits, 1), n - hits + 1), 0.0)
+    high = np.where(hits < n, stats.beta.ppf(1 - tail, hits + 1, np.maximum(n - hits, 1)), 1.0)
+    expected = float(stats.chi2.cdf(k * k, 1))
+    return Coverage(hits / n, low, high, expected, runs)
+
+
+def _tail(confidence: float) -> float:
+    confidence = validation.number("confidence", confidence)
+    if not 0 < confidence < 1:
+        raise ValueError(f"confidence must be between 0 and 1; found {confidence}")
+    return (1 - confidence) / 2
+
+
+def _runs(error: Any, cov: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Errors and covariances with the same leading axes, of which there is at least one."""
+    error = validation.real_array("error", error, "", finite=False)
+    cov = validation.real_array("cov", cov, "", finite=False)
+    n = error.shape[-1] if error.ndim else 0
+    if error.ndim < 2 or cov.shape[-2:] != (n, n):
+        raise ValueError(
+            "error and cov must have shapes (runs, ..., n) and (runs, ..., n, n); "
+            f"found {error.shape} and {cov.shape}"
+        )
+    batch = validation.batch(error=error.shape[:-1], cov=cov.shape[:-2])
+    return np.broadcast_to(error, (*batch, n)), np.broadcast_to(cov, (*batch, n, n))
+
+
+def _counted(used: np.ndarray, needed: int) -> np.ndarray:
+    runs = np.sum(used, axis=0)
+    if np.any(runs < needed):
+        raise ValueError(
+            f"error and cov must hold at least {needed} finite runs; found {np.min(runs)}"
+        )
+    return runs

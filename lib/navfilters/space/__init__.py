@@ -1,0 +1,62 @@
+"""Space: frames, quaternions, gravity, orbits and what is measured in them."""
+
+from navfilters.space.earth_fixed_orbit import EARTH_RATE, EarthFixedOrbit
+from navfilters.space.frames import (
+    FLATTENING,
+    SEMI_MAJOR,
+    antenna_axes,
+    body_axes,
+    east_north_up,
+    ecef_to_geodetic,
+    ellipsoid_intersection,
+    enu_covariance,
+    geodetic_to_ecef,
+)
+from navfilters.space.gravity import EARTH, Gravity
+from navfilters.space.image_measurement import Measurement, NavigationState, SarGeometry
+from navfilters.space.inertial_orbit import CACHED, INTEGRATORS, Interval, Orbit, perigee_apogee
+from navfilters.space.quaternions import (
+    conjugate,
+    cross_matrix,
+    from_rotation_vector,
+    matrix,
+    normalized,
+    product,
+    rotation_vector,
+)
+from navfilters.space.star_earth_sensor import StarEarthSensor
+from navfilters.space.thrust import COASTING, Thrust
+
+__all__ = [
+    "CACHED",
+    "COASTING",
+    "EARTH",
+    "EARTH_RATE",
+    "FLATTENING",
+    "INTEGRATORS",
+    "SEMI_MAJOR",
+    "EarthFixedOrbit",
+    "Gravity",
+    "Interval",
+    "Measurement",
+    "NavigationState",
+    "Orbit",
+    "SarGeometry",
+    "StarEarthSensor",
+    "Thrust",
+    "antenna_axes",
+    "body_axes",
+    "conjugate",
+    "cross_matrix",
+    "east_north_up",
+    "ecef_to_geodetic",
+    "ellipsoid_intersection",
+    "enu_covariance",
+    "from_rotation_vector",
+    "geodetic_to_ecef",
+    "matrix",
+    "normalized",
+    "perigee_apogee",
+    "product",
+    "rotation_vector",
+]

@@ -1,0 +1,126 @@
+"""The pull of an oblate Earth: potential, acceleration and gradient."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from navfilters.numerics import validation
+from navfilters.numerics.analytic import dot
+from navfilters.types import Array
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """A central body and its oblateness.
+
+    Parameters
+    ----------
+    mu : float
+        Gravitational constant, m^3/s^2.
+    radius : float
+        Equatorial radius R_e, m.
+    J2 : float
+        Second zonal coefficient; 0 leaves two bodies.
+
+    Raises
+    ------
+    ValueError
+        mu or radius not positive, or anything not finite.
+
+    References
+    ----------
+    xiong2009, Eq. (36); the text gives no values, these are WGS-84's.
+    """
+
+    mu: float = 3.986004418e14
+    radius: float = 6378137.0
+    J2: float = 1.08262668e-3
+
+    def __post_init__(self) -> None:
+        for name in ("mu", "radius", "J2"):
+            value = validation.real_array(name, getattr(self, name), "")
+            if value.ndim or (name != "J2" and value <= 0):
+                needed = "a number" if name == "J2" else "a positive number"
+                raise ValueError(f"{name} must be {needed}; found {getattr(self, name)}")
+
+    def potential(self, r: Array) -> Array:
+        """mu/r (1 - J2/2 (R_e/r)^2 (3 z^2/r^2 - 1)), whose gradient is the acceleration.
+
+        Parameters
+        ----------
+        r : array (..., 3)
+            Position from the body's centre, m; the third axis is its axis of symmetry.
+
+        Returns
+        -------
+        array (...)
+            m^2/s^2.
+        """
+        xp = r.__array_namespace__()
+        s = 1 / dot(r, r)
+        z = r[..., 2]
+        return self.mu * xp.sqrt(s) * (1 - self._k * s * (z * z * s - 1 / 3))
+
+    def acceleration(self, r: Array) -> Array:
+        """-mu/r^3 (r (1 + k (1 - 5 z^2/r^2)) + 2 k z e_z),   k = 3/2 J2 (R_e/r)^2.
+
+        Parameters
+        ----------
+        r : array (..., 3)
+            Position, m, as for the potential.
+
+        Returns
+        -------
+        array (..., 3)
+            m/s^2. Not finite at the centre.
+
+        References
+        ----------
+        xiong2009, Eq. (36), rows 4 to 6.
+        """
+        xp = r.__array_namespace__()
+        z = r[..., 2]
+        s = 1 / dot(r, r)
+        of_sphere = (-self.mu * s) * xp.sqrt(s)
+        of_J2 = (self._k * s) * of_sphere
+        along = of_sphere + of_J2 * (1 - (5 * s) * (z * z))
+        # One factor for each component: r is multiplied once, and the rest has no third axis.
+        return r * (along[..., None] + of_J2[..., None] * xp.asarray(2 * AXIS))
+
+    def gradient(self, r: Array) -> Array:
+        """Derivative of the acceleration with respect to position: the gravity gradient.
+
+        Parameters
+        ----------
+        r : array (..., 3)
+            Position, m, as for the potential.
+
+        Returns
+        -------
+        array (..., 3, 3)
+            s^-2, symmetric and, the potential being harmonic, without trace.
+
+        References
+        ----------
+        xiong2009, the F of Eq. (4) for Eq. (36).
+        """
+        xp = r.__array_namespace__()
+        s = (1 / dot(r, r))[..., None]
+        u = r * xp.sqrt(s)  # unit vector
+        c = u[..., 2:]
+        size, k = self.mu * s * xp.sqrt(s), self._k * s
+        n = xp.asarray(AXIS)
+        of_u = (size * (3 + k * (5 - 35 * c * c))) * u
+        of_n = (size * k) * (10 * c * u - n)
+        of_I = (size * (k * (5 * c * c - 1) - 1))[..., None]
+        G = of_u[..., :, None] * u[..., None, :] + of_I * xp.eye(3)
+        along_n = of_n[..., :, None] * n
+        return G + (along_n + along_n.mT)
+
+    @property
+    def _k(self) -> float:
+        return 1.5 * self.J2 * self.radius**2
+
+
+AXIS = np.array([0.0, 0.0, 1.0])
+EARTH = Gravity()

@@ -1,0 +1,177 @@
+"""Attitude quaternions in Shuster's convention: scalar last, passive.
+
+A quaternion q_a^b turns no vector: it changes the axes in which one is expressed, from a to b, by
+T(q_a^b). Products compose as the matrices do, from right to left:
+
+    T(p (x) q) = T(p) T(q),   q_a^c = q_b^c (x) q_a^b
+
+Hamilton's product, which SciPy's ``Rotation`` has, is the same with the operands exchanged, and the
+matrix of a ``Rotation``, which is active, is the transpose: T(q) = Rotation.from_quat(q)^T.
+"""
+
+from navfilters.numerics.analytic import absolute, atan2, dot
+from navfilters.types import Array
+
+
+def cross_matrix(v: Array) -> Array:
+    """[v x], with [v x] u = v x u.
+
+    Parameters
+    ----------
+    v : array (..., 3)
+
+    Returns
+    -------
+    array (..., 3, 3)
+        In the units of v.
+
+    References
+    ----------
+    pogorelsky2020, Eq. (7).
+    """
+    xp = v.__array_namespace__()
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    o = xp.zeros_like(x)
+    rows = [[o, -z, y], [z, o, -x], [-y, x, o]]
+    return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def product(p: Array, q: Array) -> Array:
+    """p (x) q: first q, then p.
+
+    Parameters
+    ----------
+    p, q : array (..., 4)
+        Quaternions, scalar last.
+
+    Returns
+    -------
+    array (..., 4)
+
+    References
+    ----------
+    pogorelsky2020, Eq. (5).
+    """
+    xp = p.__array_namespace__()
+    a, b, c, d = (p[..., i] for i in range(4))
+    x, y, z, w = (q[..., i] for i in range(4))
+    parts = [
+        d * x + w * a - (b * z - c * y),
+        d * y + w * b - (c * x - a * z),
+        d * z + w * c - (a * y - b * x),
+        d * w - (a * x + b * y + c * z),
+    ]
+    return xp.stack(parts, axis=-1)
+
+
+def conjugate(q: Array) -> Array:
+    """The opposite rotation.
+
+    Parameters
+    ----------
+    q : array (..., 4)
+        Quaternion, scalar last.
+
+    Returns
+    -------
+    array (..., 4)
+        The inverse, if q has length one.
+    """
+    xp = q.__array_namespace__()
+    return xp.concat([-q[..., :3], q[..., 3:]], axis=-1)
+
+
+def normalized(q: Array) -> Array:
+    """The quaternion of length one in the direction of q.
+
+    Parameters
+    ----------
+    q : array (..., 4)
+
+    Returns
+    -------
+    array (..., 4)
+        Not finite for the zero quaternion.
+    """
+    xp = q.__array_namespace__()
+    return q / xp.sqrt(dot(q, q))[..., None]
+
+
+def matrix(q: Array) -> Array:
+    """T(q), the direction cosines that take components from the first to the second frame of q.
+
+    T(q) = (q_s^2 - q_v . q_v) I + 2 q_v q_v^T - 2 q_s [q_v x]
+
+    Parameters
+    ----------
+    q : array (..., 4)
+        Unit quaternion, scalar last.
+
+    Returns
+    -------
+    array (..., 3, 3)
+
+    References
+    ----------
+    pogorelsky2020, Eq. (6), where q_s in the last term is printed as a vector.
+    """
+    xp = q.__array_namespace__()
+    v, s = q[..., :3], q[..., 3, None, None]
+    scalar = s * s - dot(v, v)[..., None, None]
+    outer = v[..., :, None] * v[..., None, :]
+    return scalar * xp.eye(3) + 2 * outer - 2 * s * cross_matrix(v)
+
+
+def from_rotation_vector(theta: Array) -> Array:
+    """The quaternion of a rotation about the direction of theta, by its length.
+
+    dq = (theta / a sin(a / 2), cos(a / 2)),   a = norm(theta),   T(dq) = I - [theta x] + ...
+
+    Parameters
+    ----------
+    theta : array (..., 3)
+        rad.
+
+    Returns
+    -------
+    array (..., 4)
+        Of length one.
+
+    Notes
+    -----
+    The sine is divided by the angle as sinc, which is 1 at zero: nothing is lost for small angles.
+
+    References
+    ----------
+    pogorelsky2020, Eqs. (25) and (37), which is 0/0 as printed for no rotation.
+    """
+    xp = theta.__array_namespace__()
+    angle = xp.sqrt(dot(theta, theta))[..., None]
+    some = xp.where(angle.real > 0, angle, 1.0)
+    ratio = xp.where(angle.real > 0, xp.sin(some / 2) / some, 0.5)
+    return xp.concat([ratio * theta, xp.cos(angle / 2)], axis=-1)
+
+
+def rotation_vector(q: Array) -> Array:
+    """The rotation vector of a quaternion, of length 0 to pi; q and -q have the same.
+
+    Parameters
+    ----------
+    q : array (..., 4)
+        Unit quaternion, scalar last.
+
+    Returns
+    -------
+    array (..., 3)
+        rad.
+
+    Notes
+    -----
+    The angle is 2 atan2(norm(q_v), abs(q_s)): an arccosine would lose half of the digits near zero.
+    """
+    xp = q.__array_namespace__()
+    v, s = q[..., :3], q[..., 3:]
+    sine = xp.sqrt(dot(v, v))[..., None]
+    some = xp.where(sine.real > 0, sine, 1.0)
+    ratio = xp.where(sine.real > 0, 2 * atan2(some, absolute(s)) / some, 2.0)
+    return xp.where(s.real < 0, -ratio, ratio) * v

@@ -1,0 +1,128 @@
+"""Angles between the direction of the Earth's centre and stars."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from navfilters.numerics import validation
+from navfilters.numerics.analytic import atan2, dot
+from navfilters.types import Array
+
+
+@dataclass(frozen=True, eq=False)
+class StarEarthSensor:
+    """The angle between each star and the Earth's centre: y_i = arccos(-u_i . r / norm(r)) + v_i.
+
+    Parameters
+    ----------
+    stars : array (m, 3)
+        A vector towards each star, inertial; scaled to length one here.
+    R : array (..., m, m)
+        Covariance of the noise v, symmetric positive definite, rad^2.
+
+    Raises
+    ------
+    ValueError
+        A star without a direction; R of another size or not definite.
+
+    Notes
+    -----
+    The arccosine loses half of the digits near 0 and pi, where the spacecraft lies in the line of
+    star and Earth; atan2(norm(u x r), -u . r) keeps them. On that line the angle has no
+    derivatives: they are not finite there. The velocity does not enter.
+
+    References
+    ----------
+    xiong2009, Eqs. (37)-(38) and Fig. 1.
+    """
+
+    stars: Array
+    R: Array
+
+    def __post_init__(self) -> None:
+        stars = validation.real_array("stars", self.stars, "m, 3")
+        if stars.ndim != 2 or stars.shape[1] != 3:
+            raise ValueError(f"stars must have shape (m, 3); found {stars.shape}")
+        length = np.linalg.norm(stars, axis=1)
+        if not (length > 0).all():
+            raise ValueError(f"stars must be directions; found zero at index {length.argmin()}")
+        R = validation.covariance("R", self.R, len(stars), definite=True)
+        object.__setattr__(self, "stars", stars / length[:, None])
+        object.__setattr__(self, "R", R)
+
+    def h(self, x: Array) -> Array:
+        """The angles, (..., m).
+
+        Parameters
+        ----------
+        x : array (..., 6)
+            Inertial position, m, and velocity, m/s.
+
+        Returns
+        -------
+        array (..., m)
+            Radians, 0 to pi.
+
+        References
+        ----------
+        xiong2009, Eq. (38).
+        """
+        xp = x.__array_namespace__()
+        r = x[..., None, :3]
+        u = xp.asarray(self.stars)
+        w = xp.linalg.cross(u, r)
+        return atan2(xp.sqrt(dot(w, w)), -dot(u, r))
+
+    def jacobian(self, x: Array) -> Array:
+        """H: across r and towards the star, 1 / norm(r) long; zero for the velocity.
+
+        H_i = r x (u_i x r) / (norm(r)^2 norm(u_i x r))
+
+        Parameters
+        ----------
+        x : array (..., 6)
+
+        Returns
+        -------
+        array (..., m, 6)
+            rad/m, then rad s/m.
+        """
+        xp = x.__array_namespace__()
+        u_r, towards, _, r, _ = self._axes(x)
+        return xp.concat([towards / r, xp.zeros_like(u_r)], axis=-1)
+
+    def hessian(self, x: Array) -> Array:
+        """Second derivatives of each angle, in the axes along r, towards the star, and normal n.
+
+        -(e_r e_t^T + e_t e_r^T + cot(theta) e_n e_n^T) / norm(r)^2,   theta the angle from u to r
+
+        Parameters
+        ----------
+        x : array (..., 6)
+
+        Returns
+        -------
+        array (..., m, 6, 6)
+            rad/m^2 in the block of the position; zero elsewhere.
+        """
+        xp = x.__array_namespace__()
+        along, towards, normal, r, cotangent = self._axes(x)
+        pair = along[..., :, None] * towards[..., None, :]
+        of_normal = normal[..., :, None] * normal[..., None, :]
+        block = -(pair + pair.mT + cotangent[..., None] * of_normal) / (r * r)[..., None]
+        zero = xp.zeros_like(block)
+        top, bottom = xp.concat([block, zero], axis=-1), xp.concat([zero, zero], axis=-1)
+        return xp.concat([top, bottom], axis=-2)
+
+    def _axes(self, x: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """Unit vectors along r, towards the star and normal to both, norm(r) and cot(theta)."""
+        xp = x.__array_namespace__()
+        u = xp.asarray(self.stars)
+        position = x[..., None, :3] + xp.zeros_like(u)
+        r = xp.sqrt(dot(position, position))[..., None]
+        along = position / r
+        w = xp.linalg.cross(u, along)
+        sine = xp.sqrt(dot(w, w))[..., None]
+        normal = w / sine
+        cotangent = dot(u, along)[..., None] / sine
+        return along, xp.linalg.cross(along, normal), normal, r, cotangent
