@@ -1,11 +1,14 @@
 """One deterministic hypothesis profile, so that a failure is everybody's; JAX if it is there."""
 
 import importlib.util
+import os
 import re
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+os.environ["JAX_ENABLE_X64"] = "1"  # read when JAX is imported
 
 settings.register_profile(
     "deterministic", derandomize=True, deadline=None, max_examples=50, database=None

@@ -20,8 +20,6 @@ from navfilters.space.quaternions import (
     rotation_vector,
 )
 
-jax.config.update("jax_enable_x64", True)
-
 part = st.floats(-1, 1)
 quaternions = (
     st.tuples(part, part, part, part)

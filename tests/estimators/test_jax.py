@@ -12,8 +12,6 @@ from numpy.testing import assert_allclose
 from navfilters import FILTERS, Gaussian, SigmaPoints
 from navfilters.models import Linear, RangeBearing
 
-jax.config.update("jax_enable_x64", True)
-
 every_filter = pytest.mark.parametrize("name", FILTERS)
 
 

@@ -9,8 +9,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from navfilters import Gaussian, linearized, unscented
 from navfilters.space.star_earth_sensor import StarEarthSensor
 
-jax.config.update("jax_enable_x64", True)
-
 STARS = np.array([[1.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 R = np.diag([1e-8, 2e-8])
 SENSOR = StarEarthSensor(STARS, R)

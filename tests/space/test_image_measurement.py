@@ -17,8 +17,6 @@ from navfilters.space.frames import antenna_axes, body_axes, ellipsoid_intersect
 from navfilters.space.image_measurement import Measurement, SarGeometry
 from navfilters.space.quaternions import cross_matrix, from_rotation_vector, matrix, product
 
-jax.config.update("jax_enable_x64", True)
-
 R0 = np.array([-1108465.150, -6100044.949, 3397134.666])
 V0 = np.array([-1003.9419331, 3801.3289491, 6498.2536689])
 R = np.diag([0.0, 0.0, 1.0, 0.54**2])

@@ -16,8 +16,6 @@ from navfilters.estimators.discrete import extended_kalman_filter, predict
 from navfilters.numerics.complex_step import complex_step
 from navfilters.papers.lecture16.pendulum import Setup, band_limited_noise, discretised, sampled
 
-jax.config.update("jax_enable_x64", True)
-
 NEAR, FAR = Setup(duration=8.0), Setup(duration=8.0, released=1.2)
 AT = np.array([0.7, -1.3]), np.array([0.2]), np.array([0.4, -0.6]), 1.5
 SENSING = AT[0], np.array([0.03]), 1.5

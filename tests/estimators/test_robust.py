@@ -20,7 +20,6 @@ from navfilters.models import Linear
 from navfilters.papers import xiong2009
 
 inv = np.linalg.inv
-jax.config.update("jax_enable_x64", True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from test_probing import ALONE, PRIORS, RIGHT, WRONG, Model, Z
+from wrong_models import ALONE, PRIORS, RIGHT, WRONG, Model, Z
 
 from navfilters import FILTERS, Gaussian, SigmaPoints, sweep
 from navfilters.estimators.adaptive import AdaptiveEKF

@@ -19,8 +19,6 @@ from navfilters.space.frames import body_axes, ellipsoid_intersection, enu_covar
 from navfilters.space.image_measurement import Measurement, SarGeometry
 from navfilters.space.quaternions import conjugate, from_rotation_vector, product, rotation_vector
 
-jax.config.update("jax_enable_x64", True)
-
 R0 = np.array([-1108465.150, -6100044.949, 3397134.666])
 V0 = np.array([-1003.9419331, 3801.3289491, 6498.2536689])
 R = np.diag([0.0, 0.0, 1.0, 0.54**2])

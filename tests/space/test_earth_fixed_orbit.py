@@ -14,8 +14,6 @@ from navfilters.space.earth_fixed_orbit import EarthFixedOrbit
 from navfilters.space.gravity import EARTH, Gravity
 from navfilters.space.inertial_orbit import Orbit
 
-jax.config.update("jax_enable_x64", True)
-
 W = 7.292115e-5
 SCALE = np.array([1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3, 1e-6, 1e-6, 1e-6])  # m, m/s, rad of one size
 HOUSTON = np.array(

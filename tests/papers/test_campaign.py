@@ -174,7 +174,7 @@ def test_the_command_prints_what_it_found(whole, monkeypatch, capsys):
 def test_the_command_says_what_is_wrong(monkeypatch, capsys):
     with pytest.raises(SystemExit):
         command.main(["--campaign", "there", "--runs", "1"])
-    assert "runs must be an integer of at least 2; found 1" in capsys.readouterr().err
+    assert "--runs must be at least 2 and --seed at least 0; found 1, 0" in capsys.readouterr().err
 
     def stopped(*arguments):
         raise KeyboardInterrupt

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from test_models import POLAR, PRIORS, AsClass, AsNamedTuple, R, Z, in_closures, quiet
+from polar_models import POLAR, PRIORS, AsClass, AsNamedTuple, R, Z, in_closures, quiet
 
 from navfilters import FILTERS, run
 

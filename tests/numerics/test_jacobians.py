@@ -12,8 +12,6 @@ from navfilters import Gaussian
 from navfilters.numerics.complex_step import complex_step
 from navfilters.numerics.jacobians import around, check_model, examine, jacobian
 
-jax.config.update("jax_enable_x64", True)
-
 
 def two_body(x, xp=np):
     """Four components of very different size, from a state in metres and metres per second."""

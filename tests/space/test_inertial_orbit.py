@@ -14,8 +14,6 @@ from navfilters.space.gravity import EARTH, Gravity
 from navfilters.space.inertial_orbit import Orbit, perigee_apogee
 from navfilters.space.thrust import COASTING, Thrust
 
-jax.config.update("jax_enable_x64", True)
-
 MU, RE, J2 = 3.986004418e14, 6378137.0, 1.08262668e-3
 SCALE = np.array([1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3])  # m and m/s of similar weight in an orbit
 BURN = Thrust(0.45, ((30, 70),))

@@ -15,8 +15,6 @@ from navfilters import Gaussian
 from navfilters.estimators.continuous import extended_kalman_bucy, linearized_kalman_bucy
 from navfilters.estimators.continuous_system import ContinuousSystem, Reference, reference_residual
 
-jax.config.update("jax_enable_x64", True)
-
 # Three states, two inputs, two process noises, three measurement noises in two measurements.
 A = np.array([[-0.4, 1.0, 0.2], [-1.5, -0.3, 0.0], [0.1, 0.5, -0.7]])
 B = np.array([[0.0, 0.3], [1.0, 0.0], [0.2, -0.5]])
