@@ -1,7 +1,8 @@
 """Kalman-type filters as one update with different moments, batched, and every claim checked."""
 
 from navfilters import _moved
-from navfilters.estimators.filter import FILTERS, Filter
+from navfilters.estimators.catalogue import FILTERS
+from navfilters.estimators.filter import Filter
 from navfilters.estimators.moments import linearized, second_order, unscented
 from navfilters.estimators.sigma_points import SigmaPoints
 from navfilters.estimators.update import kalman_update

@@ -1,31 +1,21 @@
-"""The adaptive EKF: process noise tuned by the autocorrelation of the innovations."""
+"""The adaptive EKF of Xiong et al. as a rule: Q tuned by the autocorrelation of the innovations."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from navfilters.estimators.extended import (
-    Dynamics,
-    _given,
-    _moved,
-    _noise,
-    _spread,
-    _update,
-    _zeros,
-)
+from navfilters.estimators.rule import Rule, zeros
 from navfilters.numerics import validation
 from navfilters.numerics.small_matrices import right_divide
-from navfilters.types import Array, Gaussian, MeasurementModel
+from navfilters.types import Array, Gaussian, Moments
 
 
-class AdaptiveState(NamedTuple):
-    """What the AEKF remembers.
+class AdaptiveMemory(NamedTuple):
+    """What the adaptive rule remembers.
 
     Parameters
     ----------
-    estimate : Gaussian
-        mean (..., n), cov (..., n, n), after the last update.
     innovations : array (..., N + k, m)
         The last innovations, the newest at the end; zeros before the first.
     count : int array (...)
@@ -34,7 +24,6 @@ class AdaptiveState(NamedTuple):
         E of the last step; the identity at first and without ``memory``.
     """
 
-    estimate: Gaussian
     innovations: Array
     count: Array
     factor: Array
@@ -47,8 +36,8 @@ def _paper_directions() -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class AdaptiveEKF:
-    """The extended Kalman filter that tunes Q by the autocorrelation of its innovations.
+class AdaptiveNoise(Rule):
+    """The rule that tunes Q by the autocorrelation of the innovations.
 
     Sigma = F P F^T + E Q_0 E^T,   E = expm(A M A^T / 2),   M = (C_1 + ... + C_k) C_0^-1,
     C_i = (N - 1)^-1 sum of y_j y_{j-i}^T over the last N innovations y_j
@@ -64,9 +53,6 @@ class AdaptiveEKF:
     directions : array (..., n, m)
         Where each innovation drives the process noise; the paper's for a state of position and
         velocity and two stars.
-    current : bool
-        Whether the newest y_j is that of the step itself, which is known before Q because it
-        depends on the predicted mean alone, instead of that of the step before.
     memory : bool
         Whether each step multiplies the last one's E, instead of the identity: Q is an integrator.
     cap : float or array (...)
@@ -104,7 +90,6 @@ class AdaptiveEKF:
     k: int = 2
     N: int = 15
     directions: Array = field(default_factory=_paper_directions, metadata={"axes": 2})
-    current: bool = False
     memory: bool = False
     cap: Array = np.inf
 
@@ -116,47 +101,43 @@ class AdaptiveEKF:
             "k": validation.whole_number("k", self.k, 1),
             "N": validation.whole_number("N", self.N, 2),
             "directions": validation.real_array("directions", self.directions, "n, m"),
-            "current": validation.flag("current", self.current),
             "memory": validation.flag("memory", self.memory),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 
-    def init(self, prior: Gaussian) -> AdaptiveState:
-        """The state before any measurement; as :meth:`ExtendedKalman.init`."""
-        prior = _given(prior)
-        xp = prior.mean.__array_namespace__()
-        count = _zeros(prior)
-        window = (*count.shape, self.N + self.k, np.shape(self.directions)[-1])
-        n = prior.mean.shape[-1]
-        return AdaptiveState(
-            prior, xp.zeros(window), count, xp.zeros((*count.shape, n, n)) + xp.eye(n)
-        )
+    looks = True
 
-    def step(
-        self, state: AdaptiveState, z: Array, dynamics: Dynamics, sensor: MeasurementModel
-    ) -> AdaptiveState:
-        """One prediction with the tuned Q and one update; as :meth:`ExtendedKalman.step`."""
-        x, F = _moved(state.estimate, dynamics)
-        xp = x.__array_namespace__()
-        z = validation.given("z", z)
-        y = (z - validation.core("sensor.h", sensor.h(x), z.shape[-1:]))[..., None, :]
-        past = xp.broadcast_to(state.innovations, (*y.shape[:-2], *state.innovations.shape[-2:]))
-        window = xp.concat([past[..., 1:, :], y], axis=-2)
-        count = xp.broadcast_to(state.count + 1, y.shape[:-2])
-        used, exist = (window, count) if self.current else (past, count - 1)
-        E = self._factor(used, (exist >= self.N + self.k)[..., None, None])
-        noise = _noise(state.estimate, dynamics)
-        if self.memory:
-            E = E @ state.factor
-            growth = xp.linalg.trace(E @ noise @ E.mT) / xp.linalg.trace(noise)
-            kept = xp.asarray(self.cap) / growth
-            E = xp.sqrt(xp.where(kept < 1, kept, 1.0))[..., None, None] * E
-        prior = Gaussian(x, _spread(state.estimate, F, dynamics, E @ noise @ E.mT))
-        estimate = _update(prior, z, sensor)
-        factor = E if self.memory else state.factor
-        factor = xp.broadcast_to(factor, (*estimate.mean.shape[:-1], *E.shape[-2:]))
-        return AdaptiveState(estimate, window, count, factor)
+    def init(self, prior: Gaussian) -> AdaptiveMemory:
+        """An empty window."""
+        xp, n = prior.mean.__array_namespace__(), prior.cov.shape[-1]
+        count = zeros(prior)
+        window = (*count.shape, self.N + self.k, np.shape(self.directions)[-1])
+        return AdaptiveMemory(xp.zeros(window), count, xp.zeros((*count.shape, n, n)) + xp.eye(n))
+
+    def process_noise(self, memory: AdaptiveMemory, Q: Array) -> tuple[Array, AdaptiveMemory]:
+        """E Q E^T."""
+        full = (memory.count >= self.N + self.k)[..., None, None]
+        E = self._factor(memory.innovations, full)
+        if not self.memory:
+            return E @ Q @ E.mT, memory
+        xp, E = E.__array_namespace__(), E @ memory.factor
+        growth = xp.linalg.trace(E @ Q @ E.mT) / xp.linalg.trace(Q)
+        kept = xp.asarray(self.cap) / growth
+        E = xp.sqrt(xp.where(kept < 1, kept, 1.0))[..., None, None] * E
+        return E @ Q @ E.mT, memory._replace(factor=E)
+
+    def enlarge(
+        self, memory: AdaptiveMemory, prior: Gaussian, y: Array | None, moments: Moments | None
+    ) -> tuple[Gaussian, AdaptiveMemory]:
+        """The prior as it is; its innovation is the newest."""
+        assert y is not None
+        xp, past = y.__array_namespace__(), memory.innovations
+        past = xp.broadcast_to(past, (*y.shape[:-1], *past.shape[-2:]))
+        window = xp.concat([past[..., 1:, :], y[..., None, :]], axis=-2)
+        count = xp.broadcast_to(memory.count + 1, y.shape[:-1])
+        factor = xp.broadcast_to(memory.factor, (*y.shape[:-1], *memory.factor.shape[-2:]))
+        return prior, AdaptiveMemory(window, count, factor)
 
     def _factor(self, window: Array, full: Array) -> Array:
         """E of the class docstring, the identity for members whose window is not full."""

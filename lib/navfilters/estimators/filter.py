@@ -1,60 +1,51 @@
-"""Ten filters that are one update: moments, perhaps a variant, and Eqs. (5)-(7)."""
+"""A filter is one pipeline, and each work changes one stage of it.
+
+::
+
+    predict --rule on P--> moments --variant--> update --retraction--> state
+"""
 
 import inspect
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 
-from navfilters.estimators.moments import linearized, noise, second_order, unscented
-from navfilters.estimators.update import kalman_update
-from navfilters.estimators.variants import (
-    Variant,
-    bump_circular,
-    bump_equivalent,
-    bump_linear,
-    bump_predicted,
-    bump_state,
-    expect_at_mean,
-    unchanged,
+from navfilters.estimators import model_parts
+from navfilters.estimators.limits import LIMITS
+from navfilters.estimators.moments import linearized, second_order, unscented
+from navfilters.estimators.prediction import (
+    predict_linearized,
+    predict_second_order,
+    predict_unscented,
 )
+from navfilters.estimators.rule import Rule, zeros
+from navfilters.estimators.state import FilterState
+from navfilters.estimators.update import (
+    FORMS,
+    Form,
+    absent,
+    correct,
+    fit,
+    innovation,
+    kalman_update,
+)
+from navfilters.estimators.variants import Variant, unchanged
 from navfilters.numerics import validation
-from navfilters.types import Array, Gaussian, MeasurementModel, Moments
+from navfilters.types import Array, Dynamics, Gaussian, MeasurementModel, Moments
 
-
-def _given(prior: Gaussian) -> Gaussian:
-    mean, cov = prior.mean, prior.cov
-    return Gaussian(validation.given("prior.mean", mean), validation.given("prior.cov", cov))
-
-
-# What each filter is on a linear model, in the textbook's terms: its P and R given (P, H, R).
-
-
-def _kalman(P, H, R):
-    return P, R
-
-
-def _kalman_bumped(P, H, R, bump=1.0):
-    return P, R + np.asarray(bump)[..., None, None] * (H @ P @ H.mT)
-
-
-def _kalman_circular(P, H, R):
-    return P, R + np.linalg.norm(P, 2, axis=(-2, -1), keepdims=True) * (H @ H.mT)
-
-
-def _kalman_equivalent(P, H, R):
-    J = np.linalg.inv(H)
-    return P, np.linalg.norm(J @ R @ J.mT, 2, axis=(-2, -1), keepdims=True) * (H @ H.mT)
-
-
-def _kalman_forgetful(P, H, R):
-    return np.linalg.norm(P, 2, axis=(-2, -1), keepdims=True) * np.eye(P.shape[-1]), R
+PREDICTIONS = {second_order: predict_second_order, unscented: predict_unscented}
+"""How the moments functions predict a state; all others linearise."""
 
 
 @dataclass(frozen=True)
 class Filter:
-    """One memoryless filter: how it predicts, what it changes, and what it is on a linear model.
+    """A filter as its stages.
+
+    ``filter(prior, z, model)`` is one update of one prior. ``init``, ``predict``, ``update`` and
+    ``step`` are the same with a state, for ``run`` and ``sweep``.
 
     Parameters
     ----------
@@ -62,23 +53,35 @@ class Filter:
         (prior, model, \\*, options) -> Moments.
     variant : callable
         (prior, model, moments, \\*, options) -> (prior, Moments).
-    limit : callable
-        (P, H, R, options) -> (P, R) of the Kalman filter that this filter equals when h(x) = H x.
+    rule : Rule, optional
+        Robust and adaptive filters have one.
+    form : {"joseph", "short"}
+        Of the update: see :func:`~navfilters.estimators.update.kalman_update`.
+
+    Raises
+    ------
+    ValueError
+        An unknown form.
     """
 
-    moments: Callable[..., Moments]
+    moments: Callable[..., Moments] = linearized
     variant: Variant = unchanged
-    limit: Callable[..., tuple[Array, Array]] = _kalman
+    rule: Rule | None = None
+    form: Form = "joseph"
+
+    def __post_init__(self) -> None:
+        if self.form not in FORMS:
+            raise ValueError(f"form must be one of {list(FORMS)}; found {self.form!r}")
 
     def __call__(self, prior: Gaussian, z: Array, model: MeasurementModel, **options) -> Gaussian:
-        """One update of every member.
+        """One update of every member, without rule and memory.
 
         Parameters
         ----------
         prior : Gaussian
             mean (..., n), cov (..., n, n).
         z : array (..., m)
-            The measurement.
+            The measurement; NaN where it was not measured.
         model : MeasurementModel
             Where it comes from.
         **options
@@ -95,29 +98,171 @@ class Filter:
         ValueError
             Masked entries, units, no numbers, trailing axes that do not fit together.
         TypeError
-            An option that this filter does not have.
+            An option that this filter does not have; a filter with a rule, which has a memory.
         """
-        unknown = set(options) - set(self.options)
-        if unknown:
-            has = ", ".join(self.options) or "none"
-            raise TypeError(f"unknown options {sorted(unknown)}; this filter has {has}")
-        mean, cov = prior.mean, prior.cov
-        plain = type(mean) is type(cov) is np.ndarray and mean.dtype.char == cov.dtype.char == "d"
-        if not plain:
-            prior = _given(prior)
-        moments = self.moments(prior, model, **_accepted(self.moments, options))
+        if self.rule is not None:
+            raise TypeError(
+                "a filter with a rule has a memory: use run, sweep, or init and step; found "
+                f"{type(self.rule).__name__}"
+            )
+        self._know(options)
+        moments = self.moments(_given(prior), model, **_accepted(self.moments, options))
         changed, moments = self.variant(prior, model, moments, **_accepted(self.variant, options))
-        return kalman_update(changed, z, moments)
+        return kalman_update(changed, z, moments, form=self.form, model=model)
 
     @property
     def options(self) -> tuple[str, ...]:
         """Names of the keywords that this filter takes."""
         return (*_keywords(self.moments), *_keywords(self.variant))
 
+    def having(self, **options) -> "Filter":
+        """The same filter with these options.
+
+        Parameters
+        ----------
+        **options
+            As in a call.
+
+        Returns
+        -------
+        Filter
+
+        Raises
+        ------
+        TypeError
+            An option that this filter does not have.
+        """
+        self._know(options)
+        stages: dict[str, Any] = {}
+        for name in ("moments", "variant"):
+            stage = getattr(self, name)
+            if own := _accepted(stage, options):
+                stages[name] = partial(stage, **own)
+        return replace(self, **stages)
+
+    def _know(self, options: dict) -> None:
+        unknown = options and set(options) - set(self.options)
+        if unknown:
+            has = ", ".join(self.options) or "none"
+            raise TypeError(f"unknown options {sorted(unknown)}; this filter has {has}")
+
+    def init(self, prior: Gaussian) -> FilterState:
+        """The state before any step.
+
+        Parameters
+        ----------
+        prior : Gaussian
+            mean (..., n), cov (..., n, n).
+
+        Returns
+        -------
+        FilterState
+        """
+        return first_state(prior, self.rule)
+
+    def predict(self, state: FilterState, dynamics: Dynamics, k: Array = 0) -> FilterState:
+        """The state one transition later.
+
+        Parameters
+        ----------
+        state : FilterState
+        dynamics : Dynamics
+        k : int
+            Number of the step, from 0.
+
+        Returns
+        -------
+        FilterState
+            Its innovation is still that of the last update.
+        """
+        dynamics = model_parts.at(dynamics, k)
+        Q, memory = validation.given("dynamics.Q", dynamics.Q), state.memory
+        if self.rule is not None:
+            Q, memory = self.rule.process_noise(memory, Q)
+        function = getattr(self.moments, "func", self.moments)
+        predict = PREDICTIONS.get(function, predict_linearized)
+        options = _accepted(predict, getattr(self.moments, "keywords", {}))
+        return state._replace(
+            estimate=predict(state.estimate, dynamics, Q, **options), memory=memory
+        )
+
+    def update(
+        self, state: FilterState, z: Array, sensor: MeasurementModel, k: Array = 0
+    ) -> FilterState:
+        """The state after a measurement.
+
+        Parameters
+        ----------
+        state : FilterState
+        z : array (..., m)
+            NaN where it was not measured.
+        sensor : MeasurementModel
+        k : int
+            Number of the step, from 0.
+
+        Returns
+        -------
+        FilterState
+        """
+        z, sensor = seen(validation.given("z", z), sensor, k)
+        gone = absent(z)
+        prior, memory, moments = state.estimate, state.memory, None
+        if self.rule is not None:
+            prior, memory, moments = self._ruled(state, z, sensor, gone)
+        if moments is None:
+            moments = self.moments(prior, sensor)
+        prior, moments = self.variant(prior, sensor, moments)
+        fit(prior, z, moments)
+        y = innovation(z, moments, sensor)
+        estimate = correct(prior, y, moments, self.form, sensor, gone)
+        return FilterState(estimate, missed(state, gone), memory, y, moments.P_zz)
+
+    def _ruled(
+        self, state: FilterState, z: Array, sensor: MeasurementModel, gone: Array | None
+    ) -> tuple[Gaussian, Any, Moments | None]:
+        """Prior and memory by the rule, which does not act where not all was measured."""
+        assert self.rule is not None
+        before, y, moments = state.estimate, None, None
+        if self.rule.looks:
+            moments = self.moments(before, sensor)
+            y = innovation(z, moments, sensor)
+        prior, memory = self.rule.enlarge(state.memory, before, y, moments)
+        if gone is not None:
+            some = gone.__array_namespace__().any(gone, axis=-1)
+            prior, memory = keep(some, (before, state.memory), (prior, memory))
+        return prior, memory, moments if prior is before else None
+
+    def step(
+        self,
+        state: FilterState,
+        z: Array,
+        sensor: MeasurementModel,
+        dynamics: Dynamics | None = None,
+        k: Array = 0,
+    ) -> FilterState:
+        """A prediction, where there are dynamics, and an update.
+
+        Parameters
+        ----------
+        state : FilterState
+        z : array (..., m)
+        sensor : MeasurementModel
+        dynamics : Dynamics, optional
+        k : int
+            Number of the step, from 0.
+
+        Returns
+        -------
+        FilterState
+        """
+        if dynamics is not None:
+            state = self.predict(state, dynamics, k)
+        return self.update(state, z, sensor, k)
+
     def linear_limit(
         self, prior: Gaussian, z: Array, model: MeasurementModel, **options
     ) -> Gaussian:
-        """What this filter must return on a linear model, by the textbook's Kalman filter.
+        """What this filter's first update must be on a linear model, by the textbook's filter.
 
         Parameters
         ----------
@@ -132,14 +277,54 @@ class Filter:
             Computed in the information form, (P^-1 + H^T R^-1 H)^-1, by LAPACK: no line of the
             filters takes part.
         """
-        z, R = validation.given("z", z), noise(model)
-        prior = _given(prior)
-        H = model.jacobian(prior.mean)
-        P, R = self.limit(prior.cov, H, R, **_accepted(self.limit, options))
+        z, prior = validation.given("z", z), _given(prior)
+        H, R = model.jacobian(prior.mean), model_parts.noise(model, prior.mean)
+        P = prior.cov if self.rule is None else self.rule.limit(prior.cov)
+        given = getattr(self.variant, "keywords", {}) | _accepted(self.variant, options)
+        P, R = LIMITS[getattr(self.variant, "func", self.variant)](P, H, R, **given)
         weight = H.mT @ np.linalg.inv(R)
         cov = np.linalg.inv(np.linalg.inv(P) + weight @ H)
         residual = z - (H @ prior.mean[..., None])[..., 0]
         return Gaussian(prior.mean + (cov @ weight @ residual[..., None])[..., 0], cov)
+
+
+def _given(prior: Gaussian) -> Gaussian:
+    mean, cov = prior.mean, prior.cov
+    if type(mean) is type(cov) is np.ndarray and mean.dtype.char == cov.dtype.char == "d":
+        return prior
+    return Gaussian(validation.given("prior.mean", mean), validation.given("prior.cov", cov))
+
+
+def first_state(prior: Gaussian, rule: Rule | None = None) -> FilterState:
+    """The state before any step, of a filter with this rule."""
+    prior = _given(prior)
+    return FilterState(prior, zeros(prior), None if rule is None else rule.init(prior))
+
+
+def seen(z: Array, sensor: MeasurementModel, k: Array) -> tuple[Array, MeasurementModel]:
+    """What is compared with the sensor of step k, and that sensor."""
+    sensor = model_parts.at(sensor, k)
+    return sensor.given(z) if hasattr(sensor, "given") else (z, sensor)
+
+
+def missed(state: FilterState, gone: Array | None) -> Array:
+    """The counter of updates at which nothing was measured."""
+    if gone is None:
+        return state.missed
+    return state.missed + gone.__array_namespace__().all(gone, axis=-1)
+
+
+def keep(some: Array, before: Any, after: Any) -> Any:
+    """``before`` in some members, ``after`` in the others, part by part."""
+    if after is None:
+        return None
+    if isinstance(after, tuple):
+        olds = (None,) * len(after) if before is None else before
+        parts = [keep(some, old, new) for old, new in zip(olds, after, strict=True)]
+        return type(after)(*parts) if hasattr(after, "_fields") else tuple(parts)
+    xp = after.__array_namespace__()
+    where = some[(..., *(None,) * (after.ndim - some.ndim))]
+    return xp.where(where, xp.nan if before is None else before, after)
 
 
 @lru_cache  # a signature costs as much as half an update of one member
@@ -149,19 +334,4 @@ def _keywords(function: Callable) -> tuple[str, ...]:
 
 
 def _accepted(function: Callable, options: dict) -> dict:
-    return {name: value for name, value in options.items() if name in _keywords(function)}
-
-
-FILTERS: dict[str, Filter] = {
-    "EKF": Filter(linearized),
-    "B-EKF 1": Filter(linearized, bump_linear, limit=_kalman_bumped),
-    "B-EKF 2": Filter(linearized, bump_circular, limit=_kalman_circular),
-    "B-EKF 3": Filter(linearized, bump_equivalent, limit=_kalman_equivalent),
-    "B-EKF 4": Filter(linearized, bump_state, limit=_kalman_forgetful),
-    "mtSOF": Filter(second_order),
-    "B-mtSOF": Filter(second_order, bump_linear, limit=_kalman_bumped),
-    "UKF": Filter(unscented),
-    "B-UKF": Filter(unscented, bump_predicted, limit=_kalman_bumped),
-    "UKFz": Filter(unscented, expect_at_mean),
-}
-"""The ten filters of perea2007, in the paper's order, by the paper's names."""
+    return {name: options[name] for name in _keywords(function) if name in options}

@@ -1,11 +1,10 @@
 """How a filter predicts its measurement: three approximations of the same three moments."""
 
-import numpy as np
-
-from navfilters.estimators.sigma_points import SigmaPoints, _is_singular, _offsets, _root
+from navfilters.estimators.model_parts import hessian, jacobian, noise, residual, retract
+from navfilters.estimators.sigma_points import SigmaPoints, is_singular, offsets, root_of
 from navfilters.numerics import validation
 from navfilters.numerics.small_matrices import matmul, outer_sum
-from navfilters.types import Array, ExactMoments, Gaussian, MeasurementModel, Moments
+from navfilters.types import Array, Gaussian, MeasurementModel, Moments
 
 
 def linearized(prior: Gaussian, model: MeasurementModel) -> Moments:
@@ -29,33 +28,11 @@ def linearized(prior: Gaussian, model: MeasurementModel) -> Moments:
     ----------
     perea2007, Eqs. (10)-(12).
     """
-    H = model.jacobian(prior.mean)
-    R = noise(model)
-    validation.core("model.jacobian", H, (R.shape[-1], prior.mean.shape[-1]))
+    H = jacobian(model, prior.mean)
+    R = noise(model, prior.mean)
+    validation.core("model.jacobian", H, (R.shape[-1], prior.cov.shape[-1]))
     P_xz = matmul(prior.cov, H.mT)
-    return Moments(model.h(prior.mean), R + matmul(H, P_xz), P_xz)
-
-
-def noise(model: MeasurementModel) -> Array:
-    """A model's R, if it is one: a vector or a number would be added to every row.
-
-    Parameters
-    ----------
-    model : MeasurementModel
-
-    Returns
-    -------
-    array (..., m, m)
-
-    Raises
-    ------
-    ValueError
-        Another shape, no real numbers, masked entries or a unit.
-    """
-    R = validation.given("model.R", model.R)
-    if R.ndim > 1 and R.shape[-1] == R.shape[-2]:
-        return R
-    return validation.core("model.R", R, R.shape[-1:] * 2 or (1, 1))
+    return Moments(model.h(prior.mean), R + matmul(H, P_xz), P_xz, H, R)
 
 
 def second_order(prior: Gaussian, model: MeasurementModel) -> Moments:
@@ -87,7 +64,8 @@ def second_order(prior: Gaussian, model: MeasurementModel) -> Moments:
     """
     first = linearized(prior, model)
     b = second_order_bias(prior, model)
-    return Moments(first.z_hat + b, first.P_zz - b[..., :, None] * b[..., None, :], first.P_xz)
+    squares = b[..., :, None] * b[..., None, :]
+    return first._replace(z_hat=first.z_hat + b, P_zz=first.P_zz - squares, R=first.R - squares)
 
 
 def second_order_bias(prior: Gaussian, model: MeasurementModel) -> Array:
@@ -109,10 +87,9 @@ def second_order_bias(prior: Gaussian, model: MeasurementModel) -> Array:
     ----------
     perea2007, the definition below Eq. (20).
     """
-    n = prior.mean.shape[-1]
-    m = np.shape(model.R)[-1]
-    hessian = validation.core("model.hessian", model.hessian(prior.mean), (m, n, n))
-    products = hessian * prior.cov[..., None, :, :]
+    n, m = prior.cov.shape[-1], noise(model, prior.mean).shape[-1]
+    second = validation.core("model.hessian", hessian(model, prior.mean), (m, n, n))
+    products = second * prior.cov[..., None, :, :]
     xp = products.__array_namespace__()
     return xp.sum(products, axis=(-2, -1)) / 2
 
@@ -138,30 +115,38 @@ def unscented(
     -------
     Moments
         z_hat (..., m), P_zz (..., m, m), P_xz (..., n, m); NaN where cov has no square root.
-        ``ExactMoments`` if some member's cov is singular.
+        ``exact`` if some member's cov is singular.
 
     References
     ----------
     perea2007, Eqs. (21)-(25); its Eq. (26) is empty.
     """
-    root, exact = _root(prior.cov, points.root)
-    X = prior.mean + _offsets(prior, points, root)
-    if exact is None:
-        del root  # a batch fills the cache
+    root, exact = root_of(prior.cov, points.root)
+    dX = offsets(prior, points, root)
+    X = retract(model, prior.mean, dX)
+    if exact is None and not hasattr(model, "retract"):
+        del dX, root  # a batch fills the cache
     xp = X.__array_namespace__()
-    R = noise(model)
+    R = noise(model, prior.mean)
     missing = R.ndim - X.ndim  # batch axes that only the model has go behind the points' axis
-    X = xp.reshape(X, (X.shape[0], *(1,) * missing, *X.shape[1:]))
+    X = _behind(X, missing)
     Z = validation.core("model.h", model.h(X), R.shape[-1:])
-    _, _, W0_c, W_i = points.weights(prior.mean.shape[-1], xp)
+    _, _, W0_c, W_i = points.weights(prior.cov.shape[-1], xp)
     # The weights sum to one. Summing differences keeps the digits that a large negative W0 would
-    # cancel.
-    z_hat = Z[0] + W_i[..., None] * xp.sum(Z[1:] - Z[0], axis=0)
-    dX, dZ = X - prior.mean, Z - z_hat
-    if exact is not None:  # what is known as a combination must not see the rounding of the mean
-        offsets = xp.reshape(_offsets(prior, points, root), X.shape)
-        dX = xp.where(_is_singular(exact)[..., None], offsets, dX)
+    # cancel, and finds the mean of angles that lie on both sides of their jump.
+    z_hat = Z[0] + W_i[..., None] * xp.sum(residual(model, Z[1:], Z[0]), axis=0)
+    dZ = residual(model, Z, z_hat)
+    if hasattr(model, "retract"):
+        dX = _behind(dX, missing)
+    elif exact is None:
+        dX = X - prior.mean
+    else:  # what is known as a combination must not see the rounding of the mean
+        dX = xp.where(is_singular(exact)[..., None], _behind(dX, missing), X - prior.mean)
     W0_c, W_i = W0_c[..., None, None], W_i[..., None, None]
     P_zz = R + W0_c * outer_sum(dZ[:1], dZ[:1]) + W_i * outer_sum(dZ[1:], dZ[1:])
-    moments = Moments(z_hat, P_zz, W_i * outer_sum(dX[1:], dZ[1:]))
-    return moments if exact is None else ExactMoments.of(moments, exact)
+    return Moments(z_hat, P_zz, W_i * outer_sum(dX[1:], dZ[1:]), exact=exact)
+
+
+def _behind(X: Array, missing: int) -> Array:
+    """Points with so many axes of length one behind that of the points."""
+    return X.__array_namespace__().reshape(X, (X.shape[0], *(1,) * missing, *X.shape[1:]))

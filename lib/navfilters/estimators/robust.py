@@ -1,4 +1,4 @@
-"""The robust and the adaptive robust EKF: covariance rules in front of the same update."""
+"""The robust and the adaptive robust EKF of Xiong et al. as rules on the predicted covariance."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,31 +6,27 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from navfilters.estimators.extended import Dynamics, _given, _update, _zeros, predict
-from navfilters.estimators.moments import linearized
+from navfilters.estimators.rule import Rule, zeros
 from navfilters.numerics import validation
 from navfilters.numerics.small_matrices import is_positive_definite, right_divide
-from navfilters.types import Array, Gaussian, MeasurementModel
+from navfilters.types import Array, Gaussian, Moments
 
 
-class RobustState(NamedTuple):
-    """What the REKF remembers.
+class RobustMemory(NamedTuple):
+    """What the robust rule remembers.
 
     Parameters
     ----------
-    estimate : Gaussian
-        mean (..., n), cov (..., n, n), after the last update.
     violations : int array (...)
         Steps so far at which gamma violated Eq. (23).
     """
 
-    estimate: Gaussian
     violations: Array
 
 
 @dataclass(frozen=True, eq=False)
-class RobustEKF:
-    """The robust (H-infinity) extended Kalman filter with L = I.
+class Robust(Rule):
+    """The H-infinity rule with L = I: every step's covariance is enlarged.
 
     Sigma = (P^-1 - gamma^-2 I)^-1,   if gamma > sqrt(max eig P)
 
@@ -47,7 +43,7 @@ class RobustEKF:
     Raises
     ------
     ValueError
-        A gamma that is not positive or an unknown on_violation; from ``step``, with "raise", when
+        A gamma that is not positive or an unknown on_violation; from a step, with "raise", when
         gamma violates Eq. (23), naming the smallest admissible gamma at that step.
 
     Notes
@@ -73,22 +69,23 @@ class RobustEKF:
                 f"on_violation must be 'skip', 'nan' or 'raise'; found {self.on_violation!r}"
             )
 
-    def init(self, prior: Gaussian) -> RobustState:
-        """The state before any measurement; as :meth:`ExtendedKalman.init`."""
-        prior = _given(prior)
-        return RobustState(prior, _zeros(prior))
+    def init(self, prior: Gaussian) -> RobustMemory:
+        """No violations."""
+        return RobustMemory(zeros(prior))
 
-    def step(
-        self, state: RobustState, z: Array, dynamics: Dynamics, sensor: MeasurementModel
-    ) -> RobustState:
-        """One prediction, Eq. (5) where Eq. (23) allows it, and one update.
-
-        As :meth:`ExtendedKalman.step`.
-        """
-        prior = predict(state.estimate, dynamics)
+    def enlarge(
+        self, memory: RobustMemory, prior: Gaussian, y: Array | None, moments: Moments | None
+    ) -> tuple[Gaussian, RobustMemory]:
+        """Eq. (5) where Eq. (23) allows it."""
         Sigma, violated = self._enlarge(prior.cov)
-        estimate = _update(Gaussian(prior.mean, Sigma), z, sensor)
-        return RobustState(estimate, _count(state.violations, violated, estimate))
+        return Gaussian(prior.mean, Sigma), RobustMemory(memory.violations + violated)
+
+    def limit(self, P: Array) -> Array:
+        """(P^-1 - gamma^-2 I)^-1 where gamma allows it, by an inverse."""
+        weight = np.asarray(self.gamma, float)[..., None, None] ** -2
+        allowed = np.linalg.eigvalsh(np.eye(P.shape[-1]) - weight * P)[..., :1, None] > 0
+        Sigma = np.linalg.inv(np.linalg.inv(P) - weight * np.eye(P.shape[-1]))
+        return np.where(allowed, Sigma, P if self.on_violation == "skip" else np.nan)
 
     def _enlarge(self, P: Array) -> tuple[Array, Array]:
         """Eq. (5), and where Eq. (23) forbids it."""
@@ -109,22 +106,19 @@ class RobustEKF:
         return xp.where(forbidden, otherwise, P + (added + added.mT) / 2), violated
 
 
-class AdaptiveRobustState(NamedTuple):
-    """What the AREKF remembers.
+class AdaptiveRobustMemory(NamedTuple):
+    """What the adaptive robust rule remembers.
 
     Parameters
     ----------
-    estimate : Gaussian
-        mean (..., n), cov (..., n, n), after the last update.
-    P_y_bar : array (..., m, m) or None
-        Estimated covariance of the innovations, Eq. (27); None before the first.
+    P_y_bar : array (..., m, m), optional
+        Estimated covariance of the innovations, Eq. (27); None, or NaN, before the first.
     robust : int array (...)
         Steps so far in the robust branch of Eq. (26).
     clipped : int array (...)
         How many of those had a lambda below 1, which was taken as 1.
     """
 
-    estimate: Gaussian
     P_y_bar: Array | None
     robust: Array
     clipped: Array
@@ -150,8 +144,8 @@ def trace_ratio(P_y_bar: Array, P_y: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class AdaptiveRobustEKF:
-    """The extended Kalman filter that enlarges P only where its innovations are too large.
+class AdaptiveRobust(Rule):
+    """The rule that enlarges P only where the innovations are too large.
 
     Sigma = P   if P_y - alpha P_y_bar is positive definite, else lambda P,
     P_y = H P H^T + R,   P_y_bar <- (rho P_y_bar + y y^T) / (rho + 1)
@@ -195,39 +189,36 @@ class AdaptiveRobustEKF:
             if (value < 0).any():
                 raise ValueError(f"{name} must be at least 0; found {value.min()}")
 
-    def init(self, prior: Gaussian) -> AdaptiveRobustState:
-        """The state before any measurement; as :meth:`ExtendedKalman.init`."""
-        prior = _given(prior)
-        return AdaptiveRobustState(prior, None, _zeros(prior), _zeros(prior))
+    looks = True
 
-    def step(
-        self, state: AdaptiveRobustState, z: Array, dynamics: Dynamics, sensor: MeasurementModel
-    ) -> AdaptiveRobustState:
-        """One prediction, Eq. (26), and one update; as :meth:`ExtendedKalman.step`."""
-        prior = predict(state.estimate, dynamics)
-        z_hat, P_y, _ = linearized(prior, sensor)
+    def init(self, prior: Gaussian) -> AdaptiveRobustMemory:
+        """No innovation yet."""
+        return AdaptiveRobustMemory(None, zeros(prior), zeros(prior))
+
+    def enlarge(
+        self,
+        memory: AdaptiveRobustMemory,
+        prior: Gaussian,
+        y: Array | None,
+        moments: Moments | None,
+    ) -> tuple[Gaussian, AdaptiveRobustMemory]:
+        """Eq. (26)."""
+        assert y is not None
+        assert moments is not None
+        P_y = moments.P_zz
         xp = P_y.__array_namespace__()
-        z = validation.given("z", z)
-        y = z - validation.core("sensor.h", z_hat, z.shape[-1:])
         P_y_bar = y[..., :, None] * y[..., None, :]
-        if state.P_y_bar is not None:
+        if memory.P_y_bar is not None:
             rho = xp.asarray(self.rho)[..., None, None]
-            P_y_bar = (rho * state.P_y_bar + P_y_bar) / (rho + 1)
+            first = xp.isnan(memory.P_y_bar)
+            P_y_bar = xp.where(first, P_y_bar, (rho * memory.P_y_bar + P_y_bar) / (rho + 1))
         excess = P_y - xp.asarray(self.alpha)[..., None, None] * P_y_bar
         robust = _finite(excess) & ~is_positive_definite(excess)
         lam = self.lam(P_y_bar, P_y) if callable(self.lam) else xp.asarray(self.lam)
         clipped = robust & (lam < 1)
         scale = xp.where(robust & (lam > 1), lam, 1.0)[..., None, None]
-        estimate = _update(Gaussian(prior.mean, scale * prior.cov), z, sensor)
-        robust = _count(state.robust, robust, estimate)
-        clipped = _count(state.clipped, clipped, estimate)
-        return AdaptiveRobustState(estimate, P_y_bar, robust, clipped)
-
-
-def _count(counter: Array, event: Array, estimate: Gaussian) -> Array:
-    """One more where the event happened, for every member of the estimate."""
-    xp = estimate.mean.__array_namespace__()
-    return xp.broadcast_to(counter + event, estimate.mean.shape[:-1])
+        counted = (memory.robust + robust, memory.clipped + clipped)
+        return Gaussian(prior.mean, scale * prior.cov), AdaptiveRobustMemory(P_y_bar, *counted)
 
 
 def _finite(A: Array) -> Array:

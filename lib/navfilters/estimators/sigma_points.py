@@ -79,7 +79,7 @@ class SigmaPoints:
 ROOTS = ("cholesky", "symmetric")
 
 
-def _root(cov: Array, kind: str) -> tuple[Array, Array | None]:
+def root_of(cov: Array, kind: str) -> tuple[Array, Array | None]:
     """The root of a covariance whose columns become the points, and what it knows exactly.
 
     A state or a combination without variance has no points of its own. A covariance that is
@@ -87,11 +87,11 @@ def _root(cov: Array, kind: str) -> tuple[Array, Array | None]:
     """
     S, exact = semidefinite_root(cov)
     if kind == "symmetric":
-        S = symmetric_root(cov, None if exact is None else _is_singular(exact))
+        S = symmetric_root(cov, None if exact is None else is_singular(exact))
     return S, exact
 
 
-def _is_singular(exact: Array) -> Array:
+def is_singular(exact: Array) -> Array:
     xp = exact.__array_namespace__()
     return xp.any(xp.linalg.diagonal(exact) == 0, axis=-1)
 
@@ -116,13 +116,13 @@ def sigma_points(prior: Gaussian, points: SigmaPoints) -> Array:
     ----------
     perea2007, Eq. (21).
     """
-    return prior.mean + _offsets(prior, points, _root(prior.cov, points.root)[0])
+    return prior.mean + offsets(prior, points, root_of(prior.cov, points.root)[0])
 
 
-def _offsets(prior: Gaussian, points: SigmaPoints, root: Array) -> Array:
+def offsets(prior: Gaussian, points: SigmaPoints, root: Array) -> Array:
     """What the points have that the mean has not, with all the batch axes of both."""
     xp = prior.cov.__array_namespace__()
-    n = prior.mean.shape[-1]
+    n = prior.cov.shape[-1]
     gamma, *_ = points.weights(n, xp)
     if gamma.ndim:
         validation.batch(points=gamma.shape, prior=root.shape[:-2])

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from navfilters.estimators.moments import noise
+from navfilters.estimators.model_parts import jacobian, noise
 from navfilters.numerics import validation
 from navfilters.numerics.small_matrices import matmul, right_divide, spectral_norm
 from navfilters.types import Array, Gaussian, MeasurementModel, Moments
@@ -55,7 +55,8 @@ def bump_linear(prior: Gaussian, model: MeasurementModel, moments: Moments, *, b
     ----------
     perea2007, Eqs. (13), (14) and, for the second-order filter, section V.A.
     """
-    spread = matmul(model.jacobian(prior.mean), moments.P_xz)
+    H = jacobian(model, prior.mean) if moments.H is None else moments.H
+    spread = matmul(H, moments.P_xz)
     return prior, _add_noise(moments, _per_member(spread, bump) * spread)
 
 
@@ -86,7 +87,7 @@ def bump_predicted(
     ----------
     perea2007, section VI.A.1 (B-UKF).
     """
-    spread = moments.P_zz - noise(model)
+    spread = moments.P_zz - noise(model, prior.mean)
     return prior, _add_noise(moments, _per_member(spread, bump) * spread)
 
 
@@ -108,7 +109,7 @@ def bump_circular(prior: Gaussian, model: MeasurementModel, moments: Moments):
     ----------
     perea2007, Eq. (15) (B-EKF 2); the norm is the spectral one.
     """
-    H = model.jacobian(prior.mean)
+    H = jacobian(model, prior.mean)
     return prior, _add_noise(moments, spectral_norm(prior.cov)[..., None, None] * matmul(H, H.mT))
 
 
@@ -135,14 +136,14 @@ def bump_equivalent(prior: Gaussian, model: MeasurementModel, moments: Moments):
     ----------
     perea2007, Eq. (16) (B-EKF 3), literally: R itself is not added.
     """
-    H = model.jacobian(prior.mean)
+    H = jacobian(model, prior.mean)
     m, n = H.shape[-2:]
     if m != n:
         raise ValueError(
             "B-EKF 3 inverts the measurement function, so model must measure as many components as "
             f"the state has; found {m} measurements of {n} states"
         )
-    R = noise(model)
+    R = noise(model, prior.mean)
     J_R = right_divide(R, H.mT).mT  # H^-1 R, R being symmetric
     in_state_space = right_divide(J_R, H.mT)
     R_new = spectral_norm(in_state_space)[..., None, None] * matmul(H, H.mT)
@@ -168,11 +169,12 @@ def bump_state(prior: Gaussian, model: MeasurementModel, moments: Moments):
     ----------
     perea2007, Eq. (17) (B-EKF 4).
     """
-    H = model.jacobian(prior.mean)
+    H = jacobian(model, prior.mean)
     xp = H.__array_namespace__()
     size = spectral_norm(prior.cov)[..., None, None]
     P_new = size * xp.eye(H.shape[-1])
-    moments = Moments(moments.z_hat, noise(model) + size * matmul(H, H.mT), size * H.mT)
+    R = noise(model, prior.mean)
+    moments = Moments(moments.z_hat, R + size * matmul(H, H.mT), size * H.mT, H, R)
     return Gaussian(prior.mean, P_new), moments
 
 
@@ -198,7 +200,8 @@ def expect_at_mean(prior: Gaussian, model: MeasurementModel, moments: Moments):
 
 
 def _add_noise(moments: Moments, extra: Array) -> Moments:
-    return moments._replace(P_zz=moments.P_zz + extra)
+    R = None if moments.R is None else moments.R + extra
+    return moments._replace(P_zz=moments.P_zz + extra, R=R)
 
 
 def _per_member(like: Array, value: Array) -> Array:

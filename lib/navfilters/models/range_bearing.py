@@ -1,6 +1,7 @@
 """z = (range, bearing) of a point in the plane, seen from the origin."""
 
 from dataclasses import dataclass
+from math import pi
 
 from navfilters.numerics import validation
 from navfilters.numerics.analytic import atan2, hypot
@@ -16,6 +17,8 @@ class RangeBearing:
     ----------
     R : array (..., 2, 2)
         Covariance of the noise v, symmetric positive definite: units squared, radians squared.
+    wrap : bool
+        Whether the residual of a bearing is brought to (-pi, pi].
 
     Raises
     ------
@@ -24,10 +27,8 @@ class RangeBearing:
 
     Notes
     -----
-    Bearings are in (-pi, pi] and residuals are *not* wrapped, as in the paper: a filter that looks
-    across the negative x1 axis sees a jump of 2 pi. At the origin the derivatives do not exist;
-    they are not finite there. The paper writes a plain arctangent; with it the UKF's divergence
-    would not look as the paper shows it.
+    Bearings are in (-pi, pi]. Without ``wrap`` a filter that looks across the negative x1 axis sees
+    a jump of 2 pi. At the origin the derivatives do not exist; they are not finite there.
 
     References
     ----------
@@ -35,9 +36,11 @@ class RangeBearing:
     """
 
     R: Array
+    wrap: bool = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "R", validation.covariance("R", self.R, 2, definite=True))
+        object.__setattr__(self, "wrap", validation.flag("wrap", self.wrap))
 
     def h(self, x: Array) -> Array:
         """Range and bearing, (..., 2).
@@ -54,6 +57,24 @@ class RangeBearing:
         """
         x1, x2 = x[..., 0], x[..., 1]
         return vector([hypot(x1, x2), atan2(x2, x1)])
+
+    def residual(self, z: Array, z_hat: Array) -> Array:
+        """z minus z_hat, (..., 2), the bearing's in (-pi, pi] with ``wrap``.
+
+        Parameters
+        ----------
+        z, z_hat : array (..., 2)
+
+        Returns
+        -------
+        array (..., 2)
+        """
+        y = z - z_hat
+        if not self.wrap:
+            return y
+        xp = y.__array_namespace__()
+        turns = xp.ceil(y[..., 1] / (2 * pi) - 0.5)
+        return vector([y[..., 0], y[..., 1] - 2 * pi * turns])
 
     def jacobian(self, x: Array) -> Array:
         """First derivatives, (..., 2, 2): rows range and bearing, columns x1 and x2.

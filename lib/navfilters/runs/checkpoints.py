@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-import navfilters
 from navfilters.runs import stored_arrays
 from navfilters.runs.march import Job, Kept
 from navfilters.runs.trees import Leaf, Tree, flatten, unflatten
+from navfilters.version import __version__
 
 
 class Checkpoint:
@@ -78,8 +78,8 @@ class Checkpoint:
 def _fingerprint(job: Job, leaves: list[Leaf], size: int) -> str:
     """A hash of all that decides what the chunks hold, but for the source of the filters."""
     digest = hashlib.sha256()
-    options = (job.engine, job.grid, job.steps, job.keep, job.z_varies, size)
-    digest.update(repr((navfilters.__version__, options)).encode())
+    options = (job.engine, job.grid, job.steps, job.z_per_step, size)
+    digest.update(repr((__version__, options)).encode())
     _add(digest, job.tree)
     for leaf in leaves:
         digest.update(repr((leaf.name, leaf.array.dtype, leaf.array.shape)).encode())

@@ -6,8 +6,8 @@ import numpy as np
 
 from navfilters.numerics.allocator import keep_freed_memory
 from navfilters.numerics.small_matrices import WRITTEN_OUT
-from navfilters.runs.march import Chunk, Job, Kept, March, Row
-from navfilters.types import Gaussian
+from navfilters.runs.march import Chunk, Job, Kept, March
+from navfilters.runs.records import stacked
 
 
 class SweepError(RuntimeError):
@@ -52,15 +52,12 @@ def by_numpy(job: Job, arrays: list[np.ndarray]) -> Kept:
     if march.prior.mean.shape[-1] <= WRITTEN_OUT:
         march = March(job, list(map(_members_innermost, arrays, job.axes)))
     with np.errstate(all="ignore"):  # a member that fails is NaN in the result: that is its report
-        carry, row = march.start()
+        state, row = march.start()
         rows = [row]
-        for k in range(1, job.steps + 1):
-            carry, row = march.step(carry, k)
+        for k in range(job.steps):
+            state, row = march.step(state, k)
             rows.append(row)
-    errors, states = zip(*rows, strict=True)
-    error = np.stack(errors) if "error" in job.keep else None
-    history = Gaussian(*map(np.stack, zip(*states, strict=True))) if "history" in job.keep else None
-    return march.finish(carry, Row(error, history))
+    return Kept(state, stacked(rows))
 
 
 def _members_innermost(array: np.ndarray, axis: int | None) -> np.ndarray:

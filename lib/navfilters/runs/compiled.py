@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from navfilters.numerics.extras import missing
-from navfilters.runs.march import Job, Kept, March, Row
+from navfilters.runs.march import Job, Kept, March
 from navfilters.runs.trees import Tree
 
 try:
@@ -50,7 +50,7 @@ def by_jax(job: Job, arrays: list[np.ndarray]) -> Kept:
     with jax.enable_x64(True):
         with _compiling:  # two threads would both compile
             tree = job.tree if job.tree.constant else _Once(job.tree, job.sweep)
-            key = (tree, job.axes, job.steps, job.keep, job.z_varies)
+            key = (tree, job.axes, job.steps, job.z_per_step)
             run = _program(key, tuple((a.shape, a.dtype) for a in arrays))
         return jax.tree.map(np.asarray, run(arrays))
 
@@ -78,10 +78,10 @@ class _Once:
 @lru_cache(maxsize=64)
 def _program(key: tuple, shapes: tuple) -> Any:
     """The executable of a job for arrays of these shapes."""
-    tree, axes, steps, keep, z_varies = key
+    tree, axes, steps, z_per_step = key
     if isinstance(tree, _Once):
         tree = tree.tree
-    job = Job("jax", tree, axes, (), steps, keep, z_varies)
+    job = Job("jax", tree, axes, (), steps, z_per_step)
     arguments = [jax.ShapeDtypeStruct(*shape) for shape in shapes]
     return jax.jit(lambda arrays: _in_blocks(job, arrays)).lower(arguments).compile()
 
@@ -100,8 +100,10 @@ def _in_blocks(job: Job, arrays: list[jax.Array]) -> Kept:
         return _scan(job, [a if m is None else m for a, m in zip(arrays, mine, strict=True)])
 
     kept = jax.lax.map(block, split)
-    final, indefinite = jax.tree.map(lambda a: _join(a, 0), (kept.final, kept.indefinite))
-    return Kept(final, indefinite, jax.tree.map(lambda a: _join(a, 1), kept.rows))
+    return Kept(
+        jax.tree.map(lambda a: _join(a, 0), kept.state),
+        jax.tree.map(lambda a: _join(a, 1), kept.rows),
+    )
 
 
 def _split(array: jax.Array, axis: int) -> jax.Array:
@@ -119,29 +121,38 @@ def _join(array: jax.Array, axis: int) -> jax.Array:
 def _scan(job: Job, arrays: list[jax.Array]) -> Kept:
     """All steps of some members."""
     march = March(job, arrays)
-    carry, row = march.start()
-    rows = jax.tree.map(lambda a: a[None], row)
-    first = 1
-    if job.steps and not _alike(carry, jax.eval_shape(lambda c: march.step(c, 1)[0], carry)):
+    state, row = march.start()
+    rows, first = jax.tree.map(lambda a: a[None], row), 0
+    if job.steps and not _alike(state, jax.eval_shape(lambda s: march.step(s, 0)[0], state)):
         # A filter may begin with None where it will have an array: its first step is another's.
-        carry, row = march.step(carry, 1)
-        rows = jax.tree.map(lambda old, new: jnp.concat([old, new[None]]), rows, row)
-        first = 2
-    if job.steps >= first:
-        z, truth = march.z, march.truth
-        series = jnp.arange(first, job.steps + 1), None, None
-        if job.z_varies:
-            series = series[0], z[first - 1 :], None if truth is None else truth[first:]
+        state, row = march.step(state, 0)
+        rows = _below(rows, jax.tree.map(lambda a: a[None], row))
+        first = 1
+    if job.steps > first:
+        numbers = jnp.arange(first, job.steps)
+        series = (numbers, march.z[first:] if job.z_per_step else None)
 
-        def step(carry, now):
-            k, z_k, truth_k = now
-            if not job.z_varies:
-                z_k, truth_k = z, truth
-            return march.advance(carry, k, z_k, truth_k)
+        def step(state, now):
+            k, z = now
+            return march.advance(state, k, z if job.z_per_step else march.z)
 
-        carry, more = jax.lax.scan(step, carry, series)
-        rows = jax.tree.map(lambda old, new: jnp.concat([old, new]), rows, more)
-    return march.finish(carry, Row(*rows))
+        state, more = jax.lax.scan(step, state, series)
+        rows = _below(rows, more)
+    return Kept(state, rows)
+
+
+def _below(rows: Any, more: Any) -> Any:
+    """One record below the other; what was None is NaN."""
+    if more is None:
+        return None
+    if isinstance(more, tuple):
+        olds = (None,) * len(more) if rows is None else rows
+        parts = [_below(old, new) for old, new in zip(olds, more, strict=True)]
+        return type(more)(*parts) if hasattr(more, "_fields") else tuple(parts)
+    blank = jnp.nan if more.dtype.kind in "fc" else 0
+    if rows is None:
+        rows = jnp.full((1, *more.shape[1:]), blank, more.dtype)
+    return jnp.concat([rows, more])
 
 
 def _alike(before: Any, after: Any) -> bool:

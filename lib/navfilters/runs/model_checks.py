@@ -5,9 +5,54 @@ from typing import Any
 
 import numpy as np
 
+from navfilters.estimators.model_parts import at, noise
 from navfilters.numerics import probing, validation
 from navfilters.numerics.probing import unwritable
 from navfilters.types import Gaussian, MeasurementModel
+
+
+def number_of_steps(steps: int | None, z: Any, z_per_step: bool) -> int:
+    """The number of steps that was given, or the length of z, or 1000."""
+    if steps is not None:
+        return validation.whole_number("steps", steps, 0)
+    return len(z) if z_per_step and not callable(z) else 1000
+
+
+def start(name: str, prior: Any, model: Any, dynamics: Any) -> Gaussian:
+    """A prior, checked: as :func:`~navfilters.numerics.validation.gaussian`, or on a manifold.
+
+    Parameters
+    ----------
+    name : str
+        The prior's, as the caller knows it.
+    prior : Gaussian
+    model : MeasurementModel
+    dynamics : Dynamics or None
+
+    Returns
+    -------
+    Gaussian
+
+    Raises
+    ------
+    ValueError
+        A wrong shape, a value that is not finite, a covariance that is not one.
+    """
+    curved = next((m for m in (model, dynamics) if hasattr(m, "retract")), None)
+    if curved is None:
+        return validation.gaussian(name, prior)
+    mean = validation.real_array(f"{name}.mean", prior.mean, "n")
+    cov = validation.covariance(f"{name}.cov", prior.cov, definite=False)
+    validation.batch(**{f"{name}.mean": mean.shape[:-1], f"{name}.cov": cov.shape[:-2]})
+    try:
+        moved = curved.retract(mean, np.zeros((*mean.shape[:-1], cov.shape[-1])))
+        validation.core("model.retract", moved, mean.shape[-1:])
+    except (ValueError, IndexError) as error:
+        raise ValueError(
+            f"{name} must hold a state (..., n) and the covariance of its error as model.retract "
+            f"takes them; found {mean.shape} and {cov.shape} ({error})"
+        ) from error
+    return Gaussian(mean, cov)
 
 
 def measurements(
@@ -15,19 +60,20 @@ def measurements(
     prior: Gaussian,
     model: MeasurementModel,
     steps: int,
-    z_varies: bool,
+    z_per_step: bool,
     name: str = "prior",
 ) -> tuple[np.ndarray, tuple[int, ...]]:
     """Measurements that fit the prior, the model's R and the number of steps.
 
     Parameters
     ----------
-    z : array-like (..., m), or (steps, ..., m) with z_varies
+    z : array-like (..., m), or (steps, ..., m) with z_per_step
+        NaN where it was not measured.
     prior : Gaussian
-        As :func:`~navfilters.numerics.validation.gaussian` returns it.
+        As :func:`start` returns it.
     model : MeasurementModel
     steps : int
-    z_varies : bool
+    z_per_step : bool
     name : str
         The prior's, as the caller knows it.
 
@@ -40,42 +86,74 @@ def measurements(
     Raises
     ------
     ValueError
-        Wrong shapes, values that are not finite, an R that is no covariance, batch axes that do not
-        broadcast.
+        Wrong shapes, infinite values, an R that is no covariance, batch axes that do not broadcast.
     """
-    axes = "steps, ..., m" if z_varies else "..., m"
-    z = validation.real_array("z", z, "m")
-    if z_varies and (z.ndim < 2 or z.shape[0] != steps):
+    axes = "steps, ..., m" if z_per_step else "..., m"
+    z = validation.real_array("z", z, "m", finite=False)
+    if np.isinf(z).any():
+        where = tuple(int(i) for i in np.argwhere(np.isinf(z))[0])
+        raise ValueError(
+            f"z must be finite, or NaN where it was not measured; found {z[where]} at index {where}"
+        )
+    if z_per_step and (z.ndim < 2 or z.shape[0] != steps):
         raise ValueError(f"z must have shape ({axes}) with {steps} steps; found {z.shape}")
+    shapes = {
+        f"{name}.mean": prior.mean.shape[:-1],
+        f"{name}.cov": prior.cov.shape[:-2],
+        "z": z.shape[1:-1] if z_per_step else z.shape[:-1],
+    }
     if not hasattr(model, "R"):
         found = type(model).__name__
         raise ValueError(f"model must have R, and h with its derivatives; found {found}")
     R = validation.covariance("model.R", model.R, definite=False)
-    m = R.shape[-1]
-    if z.shape[-1] != m:
-        raise ValueError(f"z must have shape ({axes}) with m = {m} as in model.R; found {z.shape}")
-    size = _state_size(model, prior.mean, m)
-    if size not in (None, prior.mean.shape[-1]):
-        raise ValueError(
-            f"{name}.mean must have shape (..., {size}) for this model; found {prior.mean.shape}"
-        )
-    shapes = {
-        f"{name}.mean": prior.mean.shape[:-1],
-        f"{name}.cov": prior.cov.shape[:-2],
-        "z": z.shape[1:-1] if z_varies else z.shape[:-1],
-        "model.R": R.shape[:-2],
-    }
+    shapes["model.R"] = R.shape[:-2]
+    if not hasattr(model, "given"):
+        _fits(z, prior, at(model, 0), axes, name)
     return z, validation.batch(**shapes)
 
 
-def sensor(model: MeasurementModel, mean: np.ndarray, *, name: str = "prior") -> None:
+def _fits(z, prior: Gaussian, model: MeasurementModel, axes: str, name: str) -> None:
+    """Whether a measurement, and a state, are the model's."""
+    m = _size(model, prior)
+    if z.shape[-1] != m:
+        raise ValueError(f"z must have shape ({axes}) with m = {m} as in model.R; found {z.shape}")
+    size = _state_size(model, prior.mean, m)
+    if size not in (None, prior.cov.shape[-1]):
+        raise ValueError(
+            f"{name}.mean must have shape (..., {size}) for this model; found {prior.mean.shape}"
+        )
+
+
+def models(model: Any, motion: Any, prior: Gaussian, name: str = "prior") -> None:
+    """Check the models of measurement and motion, as they are at the first step.
+
+    Parameters
+    ----------
+    model : MeasurementModel
+    motion : Dynamics or None
+    prior : Gaussian
+    name : str
+        The prior's, as the caller knows it.
+
+    Raises
+    ------
+    ValueError
+        As of :func:`sensor` and :func:`dynamics`.
+    """
+    if not hasattr(model, "given"):
+        sensor(at(model, 0), prior, name=name)
+    if motion is not None:
+        dynamics(at(motion, 0), prior)
+
+
+def sensor(model: MeasurementModel, prior: Gaussian, *, name: str = "prior") -> None:
     """Check a model's h, jacobian and hessian, those that it has, at the states of a prior.
 
     Parameters
     ----------
     model : MeasurementModel
         R (..., m, m) has all batch axes of the model.
-    mean : ndarray (..., n)
+    prior : Gaussian
     name : str
         The prior's, as the caller knows it.
 
@@ -84,7 +162,7 @@ def sensor(model: MeasurementModel, mean: np.ndarray, *, name: str = "prior") ->
     ValueError
         A function whose value has another shape, or changes with the other members of the batch.
     """
-    m, n = np.shape(model.R)[-1], mean.shape[-1]
+    m, n, mean = _size(model, prior), prior.cov.shape[-1], prior.mean
     own = np.shape(model.R)[:-2]
     for part, core in (("h", (m,)), ("jacobian", (m, n)), ("hessian", (m, n, n))):
         function = getattr(model, part, None)
@@ -100,40 +178,59 @@ def sensor(model: MeasurementModel, mean: np.ndarray, *, name: str = "prior") ->
             ) from error
 
 
-def dynamics(model: Any, mean: np.ndarray, *, name: str) -> None:
-    """Check a model's transition, its Q and its accumulate.
+def dynamics(model: Any, prior: Gaussian) -> None:
+    """Check a model's f, transition and propagate, those that it has, and its Q.
 
     Parameters
     ----------
     model : Dynamics
         Q (..., n, n) has all batch axes of the model.
-    mean : ndarray (..., n)
-    name : str
-        The model's, as the caller knows it.
+    prior : Gaussian
 
     Raises
     ------
     ValueError
-        As of :func:`sensor`, and a Q that is no covariance.
+        As of :func:`sensor`; a Q that is no covariance; neither f nor transition nor propagate.
     """
-    n = mean.shape[-1]
-    Q = validation.covariance(f"{name}.Q", getattr(model, "Q", None), n, definite=False)
+    n, mean = prior.cov.shape[-1], prior.mean
+    known = [part for part in ("f", "transition", "propagate") if hasattr(model, part)]
+    if not (known and hasattr(model, "Q")):
+        raise ValueError(
+            "dynamics must have Q and one of f, transition and propagate; found "
+            f"{type(model).__name__}"
+        )
+    size = None if "propagate" in known else n
+    Q = validation.covariance("dynamics.Q", model.Q, size, definite=False)
     own = Q.shape[:-2]
 
-    def part(i: int) -> Callable:
-        def of_transition(x):
-            pair = model.transition(x)
-            if not (isinstance(pair, tuple) and len(pair) == 2):
-                raise ValueError(f"a pair (f(x), F) is needed; found {type(pair).__name__}")
-            return pair[i]
+    def part(name: str, i: int, count: int) -> Callable:
+        def of_tuple(x):
+            found = getattr(model, name)(*((x, Q) if name == "propagate" else (x,)))
+            if not (isinstance(found, tuple) and len(found) == count):
+                needed = "(f(x), F)" if count == 2 else "(f(x), F, W)"
+                raise ValueError(f"a tuple {needed} is needed; found {type(found).__name__}")
+            return found[i]
 
-        return of_transition
+        return of_tuple
 
-    _alike(f"f(x) of {name}.transition", part(0), mean, (n,), own, whole=True)
-    _alike(f"F of {name}.transition", part(1), mean, (n, n), own, whole=False)
-    if getattr(model, "accumulate", None) is not None:
-        noise = f"{name}.accumulate"
-        _alike(noise, lambda x: model.accumulate(model.Q, x), mean, (n, n), own, whole=False)
+    state, square = mean.shape[-1:], (n, n)
+    if "f" in known:
+        _alike("dynamics.f", model.f, mean, state, own, whole=True)
+    for name, count in (("transition", 2), ("propagate", 3)):
+        if name in known:
+            called = f"dynamics.{name}"
+            _alike(f"f(x) of {called}", part(name, 0, count), mean, state, own, whole=True)
+            _alike(f"F of {called}", part(name, 1, count), mean, square, own, whole=False)
+    if "propagate" in known:
+        _alike("W of dynamics.propagate", part("propagate", 2, 3), mean, square, own, whole=False)
+
+
+def _size(model: MeasurementModel, prior: Gaussian) -> int:
+    """The number of components of a measurement."""
+    if not hasattr(model, "noise"):
+        return np.shape(model.R)[-1]
+    with np.errstate(all="ignore"):
+        return np.shape(noise(model, _first(prior.mean)))[-1]
 
 
 def _state_size(model: MeasurementModel, mean: np.ndarray, m: int) -> int | None:

@@ -35,7 +35,7 @@ class Problem:
     Parameters
     ----------
     tree : Tree
-        Of (estimator, priors, z, model, truth).
+        Of (estimator, priors, z, model, dynamics, record).
     leaves : list of Leaf
         The arrays of the tree.
     batch : tuple of int
@@ -47,24 +47,18 @@ class Problem:
     batch: tuple[int, ...]
 
     @classmethod
-    def of(cls, estimator, priors, z, model, truth, steps, z_varies) -> "Problem":
+    def of(cls, estimator, priors, z, model, dynamics, record, steps, z_per_step) -> "Problem":
         """The arguments of a sweep, checked; ValueError names the one that is wrong."""
-        priors = validation.gaussian("priors", priors)
-        remembers = hasattr(estimator, "step")
-        sensor = model[1] if remembers else model
-        z, _ = model_checks.measurements(z, priors, sensor, steps, z_varies, "priors")
-        if remembers and hasattr(model[0], "transition"):
-            n = priors.mean.shape[-1]
-            validation.covariance("model[0].Q", getattr(model[0], "Q", None), n, definite=False)
-        if truth is not None:
-            truth = _truth(truth, priors, steps, z_varies)
+        priors = model_checks.start("priors", priors, model, dynamics)
+        z, _ = model_checks.measurements(z, priors, model, steps, z_per_step, "priors")
         parts = {
             "estimator": flatten("estimator", estimator, 0),
             "mean": flatten("priors.mean", priors.mean, 1),
             "cov": flatten("priors.cov", priors.cov, 2),
-            "z": flatten("z", z, 1, int(z_varies)),
-            "model": _pair(model) if remembers else _one_model("model", model),
-            "truth": flatten("truth", truth, 1, int(z_varies)),
+            "z": flatten("z", z, 1, int(z_per_step)),
+            "model": _one_model("model", model),
+            "dynamics": _one_model("dynamics", dynamics),
+            "record": flatten("record", record, 0),
         }
         leaves = [leaf for _, more in parts.values() for leaf in more]
         batch = validation.batch(**{leaf.name: leaf.batch for leaf in leaves})
@@ -74,8 +68,8 @@ class Problem:
             )
         trees = {name: tree for name, (tree, _) in parts.items()}
         prior = Tree(Gaussian, Gaussian._fields, (trees.pop("mean"), trees.pop("cov")))
-        whole = (trees["estimator"], prior, trees["z"], trees["model"], trees["truth"])
-        names = ("estimator", "priors", "z", "model", "truth")
+        names = ("estimator", "priors", "z", "model", "dynamics", "record")
+        whole = tuple(prior if name == "priors" else trees[name] for name in names)
         return cls(
             Tree(tuple, names, whole), [_with_members(leaf, batch) for leaf in leaves], batch
         )
@@ -126,23 +120,6 @@ class Problem:
         return Chunk(number, members, [leaf.pick(index, self.grid) for leaf in self.leaves])
 
 
-def _truth(truth: Any, priors: Gaussian, steps: int, z_varies: bool) -> np.ndarray:
-    """The truth as an array that fits the state and the number of steps."""
-    truth = validation.real_array("truth", truth, "k")
-    n = priors.mean.shape[-1]
-    if truth.shape[-1] > n or (z_varies and (truth.ndim < 2 or truth.shape[0] != steps + 1)):
-        axes = f"({steps + 1}, ..., k)" if z_varies else "(..., k)"
-        raise ValueError(f"truth must have shape {axes} with k up to {n}; found {truth.shape}")
-    return truth
-
-
-def _pair(model: tuple) -> tuple[Tree, list[Leaf]]:
-    """A pair of models taken apart."""
-    parts = [_one_model(f"model[{i}]", part) for i, part in enumerate(model)]
-    names = tuple(str(i) for i in range(len(model)))
-    return Tree(tuple, names, tuple(t for t, _ in parts)), [x for _, more in parts for x in more]
-
-
 def _one_model(name: str, model: Any) -> tuple[Tree, list[Leaf]]:
     """A model taken apart: with batch axes if its R or its Q has them."""
     noise = [getattr(model, key) for key in ("R", "Q") if hasattr(model, key)]
@@ -171,38 +148,17 @@ def probe_models(job: Job, problem: Problem) -> None:
     """
     for size in (1, SEVERAL):
         march = March(job, problem.chunk(0, size).arrays)
-        mean = march.prior.mean
         try:
-            if not march.remembers:
-                model_checks.sensor(march.model, mean, name="priors")
-                continue
-            if not _of_this_library(march):
-                return
-            dynamics, sensor = march.model
-            model_checks.dynamics(dynamics, mean, name="model[0]")
-            model_checks.sensor(sensor, mean, name="priors")
+            model_checks.models(march.model, march.dynamics, march.prior, "priors")
         except ValueError as error:
-            if not any(leaf.core and leaf.name.startswith("model") for leaf in problem.leaves):
+            models = ("model", "dynamics")
+            if not any(leaf.core and leaf.name.startswith(models) for leaf in problem.leaves):
                 raise
             raise ValueError(
                 f"{error}. (In a sweep a model's arrays that differ between configurations are "
                 "fields of a dataclass, not in a closure, and those that are no matrices say so: "
                 'field(metadata={"axes": number}).)'
             ) from error
-
-
-def _of_this_library(march: March) -> bool:
-    """Whether a filter with a memory asks of its models what the extended Kalman filter does.
-
-    One whose state is no Gaussian, or whose dynamics have no transition, has an interface of its
-    own with them.
-    """
-    try:
-        with np.errstate(all="ignore"):
-            state = march.estimator.init(march.prior)
-    except Exception:  # the first step will tell, and name the configuration
-        return False
-    return hasattr(march.model[0], "transition") and "estimate" in getattr(state, "_fields", ())
 
 
 def _with_members(leaf: Leaf, batch: tuple[int, ...]) -> Leaf:

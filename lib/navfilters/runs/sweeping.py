@@ -5,17 +5,17 @@
     arguments --Problem--> chunks of members --engine, all steps--> what is kept --> Sweep
 """
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
 from uuid import uuid4
 
-import numpy as np
-
+from navfilters.estimators.any_filter import as_filter
 from navfilters.numerics import validation
 from navfilters.numerics.extras import needed
+from navfilters.runs import model_checks
 from navfilters.runs import workers as places
 from navfilters.runs.checkpoints import Checkpoint
 from navfilters.runs.chunks import SweepError, compute
@@ -26,30 +26,26 @@ from navfilters.types import Gaussian
 
 __all__ = ["Sweep", "SweepError", "sweep"]
 
-KEEP = ("final", "indefinite", "error", "history")
-
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """What was kept of a sweep; None for what was not asked for.
+    """What was kept of a sweep.
 
     Parameters
     ----------
-    final : Gaussian
-        mean (..., n) and cov (..., n, n) after the last step, with all batch axes. Of a filter with
-        a memory its last state, counters included; the Gaussian is its ``estimate``.
-    indefinite : int array (...)
-        The first step whose covariance is not positive definite, 0 for the prior, -1 for none.
-    error : array (steps + 1, ...)
-        Distance of the mean from the truth at each step, the prior's first.
-    history : Gaussian
-        mean (steps + 1, ..., n) and cov (steps + 1, ..., n, n), as of ``run``.
+    state : named tuple
+        The last state, with all batch axes; counters included.
+    record : as ``record`` returns it, optional
+        Of the prior and of every step, (steps + 1, ...).
     """
 
-    final: Any = None
-    indefinite: np.ndarray | None = None
-    error: np.ndarray | None = None
-    history: Gaussian | None = None
+    state: Any
+    record: Any = None
+
+    @property
+    def final(self) -> Gaussian:
+        """The last estimate: mean (..., n) and cov (..., n, n)."""
+        return self.state.estimate
 
 
 def sweep(
@@ -57,12 +53,12 @@ def sweep(
     priors: Gaussian,
     z: Any,
     model: Any,
-    steps: int = 1000,
+    steps: int | None = None,
     *,
+    dynamics: Any = None,
+    z_per_step: bool = False,
+    record: Callable[[Any], Any] | None = None,
     engine: Literal["numpy", "jax"] = "numpy",
-    keep: Collection[str] = ("final",),
-    truth: Any = None,
-    z_varies: bool = False,
     client: Any = None,
     workers: int | None = None,
     chunk: int | None = None,
@@ -73,31 +69,28 @@ def sweep(
 
     Parameters
     ----------
-    estimator : callable or filter with a memory
-        (prior, z, model) -> Gaussian, such as a member of ``FILTERS`` or a ``functools.partial`` of
-        one; or ``init(prior) -> state`` and ``step(state, z, dynamics, sensor) -> state``, such as
-        those of ``navfilters.estimators``. Options may be arrays, one value per configuration.
-        Where its call, or its ``step``, has a parameter named ``step`` without a default, that is
-        given the number of the step, from 0: an integer, traced under JAX.
+    estimator : Filter, or whatever :func:`~navfilters.estimators.any_filter.as_filter` takes
+        As of :func:`~navfilters.runs.loop.run`. Options may be arrays, one value per configuration.
     priors : Gaussian
         mean (..., n), cov (..., n, n). Leading axes are batch axes and broadcast with those of
         all other arguments: each member of the whole batch is one configuration.
-    z : array (..., m), or (steps, ..., m) with z_varies
-        The measurement: the same at every step, or one for each.
-    model : MeasurementModel, or (dynamics, sensor) for a filter with a memory
-        It has batch axes if its R, or its Q, has them. Then every array among its fields or
-        attributes is a matrix (..., a, b), unless it is a dataclass whose field says
+    z : array (..., m), or (steps, ..., m) with z_per_step
+        The measurement: the same at every step, or one for each; NaN where it was not measured.
+    model : MeasurementModel
+        It has batch axes if its R has them. Then every array among its fields or attributes is a
+        matrix (..., a, b), unless it is a dataclass whose field says
         ``field(metadata={"axes": number})``; what is in a closure is shared by all.
-    steps : int
-        How many steps.
+    steps : int, optional
+        By default as many as z has with z_per_step, otherwise 1000.
+    dynamics : Dynamics, optional
+        Each step begins with a prediction. It has batch axes if its Q has them.
+    z_per_step : bool
+        Whether the first axis of z is the step.
+    record : callable, optional
+        What to keep of the prior and of every step, as of ``run``: see ``navfilters.runs.records``.
+        By default nothing but the last state.
     engine : {"numpy", "jax"}
         NumPy; or JAX, compiled for these shapes, on the device that it has.
-    keep : collection of {"final", "indefinite", "error", "history"}
-        What the result holds. "error" and "history" grow with the number of steps.
-    truth : array (..., k), or (steps + 1, ..., k) with z_varies
-        For "error": the true values of the first k components of the state.
-    z_varies : bool
-        Whether the first axis of z, and of truth, is the step.
     client : distributed.Client, optional
         Compute on its cluster; wait for its first worker, and say so.
     workers : int, optional
@@ -139,11 +132,6 @@ def sweep(
     are left to BLAS (in a model, or with more than two states or measurements): then the last bits
     of each step may differ.
 
-    A filter whose state is no Gaussian, such as the multiplicative EKF with its quaternion, is
-    swept as one with a memory: ``priors`` are in the coordinates of its error, ``init`` makes a
-    named tuple of arrays from them, and the ``estimate`` of that tuple is the Gaussian again. What
-    differs from step to step is an array in the model, or in the filter, that ``step`` indexes.
-
     Examples
     --------
     >>> import numpy as np
@@ -155,27 +143,21 @@ def sweep(
     >>> sweep(FILTERS["EKF"], priors, z, model, steps=2).final.mean.round(2).tolist()
     [[55.32, 131.94], [100.0, 100.0]]
     """
-    remembers = hasattr(estimator, "step")
-    if not (remembers or callable(estimator)):
-        raise TypeError(
-            "estimator must be callable as estimator(prior, z, model), such as FILTERS['EKF'], or "
-            f"have init and step; found {estimator!r}"
-        )
-    if remembers and not (isinstance(model, tuple) and len(model) == 2):
-        raise ValueError(
-            f"model must be (dynamics, sensor) for a filter with a memory; found {model!r}"
-        )
-    steps = validation.whole_number("steps", steps, 0)
-    kinds = _keep(keep, truth)
+    estimator = as_filter(estimator)
     if engine not in ("numpy", "jax"):
         raise ValueError(f"engine must be 'numpy' or 'jax'; found {engine!r}")
-    z_varies = validation.flag("z_varies", z_varies)
+    if callable(z):
+        raise TypeError("z must be an array in a sweep; run takes a function that measures")
+    if record is not None and not callable(record):
+        raise TypeError(f"record must be callable as record(state); found {record!r}")
+    z_per_step = validation.flag("z_per_step", z_per_step)
+    steps = model_checks.number_of_steps(steps, z, z_per_step)
     workers, chunk = (
         None if value is None else validation.whole_number(name, value, 1)
         for name, value in (("workers", workers), ("chunk", chunk))
     )
-    problem = Problem.of(estimator, priors, z, model, truth, steps, z_varies)
-    job = Job(engine, problem.tree, problem.axes, problem.grid, steps, kinds, z_varies, uuid4().hex)
+    problem = Problem.of(estimator, priors, z, model, dynamics, record, steps, z_per_step)
+    job = Job(engine, problem.tree, problem.axes, problem.grid, steps, z_per_step, uuid4().hex)
     results = Results(_probe(job, problem), problem.count, steps)
     size = min(chunk, problem.count) if chunk else problem.size(steps, results.series_bytes)
     if engine == "jax":
@@ -186,21 +168,7 @@ def sweep(
     if checkpoint is not None:
         store = Checkpoint(checkpoint, job, problem.leaves, size, results.tree)
     _fill(results, job, problem, size, store, _place(job, problem, client, workers), progress)
-    kept = results.collect(problem.batch)
-    return Sweep(kept.final, kept.indefinite, kept.rows.error, kept.rows.history)
-
-
-def _keep(keep: Collection[str], truth: Any) -> tuple[str, ...]:
-    """The names, known and in their own order."""
-    if isinstance(keep, str) or not keep or not set(keep) <= set(KEEP):
-        raise ValueError(f"keep must be a collection of some of {list(KEEP)}; found {keep!r}")
-    if ("error" in keep) != (truth is not None):
-        found = "no truth" if truth is None else "a truth"
-        raise ValueError(
-            f"truth must be given if, and only if, keep has 'error'; found {found} and keep = "
-            f"{keep!r}"
-        )
-    return tuple(name for name in KEEP if name in keep)
+    return Sweep(*results.collect(problem.batch))
 
 
 def _probe(job: Job, problem: Problem) -> Kept:

@@ -1,8 +1,15 @@
 """Perea, How, Breger and Elosegui (2007): range and bearing of a fixed point."""
 
-from navfilters.papers.perea2007.experiment import Setup, improvement, isotropic, position_error
+from navfilters.papers.perea2007.experiment import (
+    FILTERS,
+    Setup,
+    improvement,
+    isotropic,
+    position_error,
+)
 
 __all__ = [
+    "FILTERS",
     "Setup",
     "improvement",
     "isotropic",

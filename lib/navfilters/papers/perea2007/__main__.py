@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from navfilters.estimators.filter import FILTERS
 from navfilters.numerics.extras import command, needed
 from navfilters.papers.perea2007.divergence_maps import (
     AXES,
@@ -17,7 +16,7 @@ from navfilters.papers.perea2007.divergence_maps import (
     relative_change,
     starts,
 )
-from navfilters.papers.perea2007.experiment import Setup
+from navfilters.papers.perea2007.experiment import FILTERS, Setup
 from navfilters.types import Array
 
 

@@ -4,9 +4,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from navfilters.estimators.filter import FILTERS
 from navfilters.models import RangeBearing
-from navfilters.papers.perea2007.experiment import Setup, isotropic, position_error
+from navfilters.papers.perea2007.experiment import FILTERS, Setup, isotropic, position_error
 from navfilters.runs.sweeping import sweep
 from navfilters.types import Array, Gaussian
 
@@ -114,7 +113,7 @@ def indicator(
         FILTERS[name],
         priors,
         setup.z,
-        setup.model if R is None else RangeBearing(R),
+        setup.model if R is None else RangeBearing(R, wrap=False),
         steps,
         engine=engine,
         workers=workers,

@@ -1,12 +1,19 @@
 """Perea, How, Breger and Elosegui (2007): range and bearing of a fixed point."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from navfilters.estimators import catalogue
+from navfilters.estimators.filter import Filter
 from navfilters.models import RangeBearing
 from navfilters.types import Array, Gaussian
+
+FILTERS: dict[str, Filter] = {
+    name: replace(f, form="short") for name, f in catalogue.FILTERS.items()
+}
+"""The ten filters as the paper has them: with the update of Eqs. (5)-(7) as it is printed."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +49,9 @@ class Setup:
 
     @property
     def model(self) -> RangeBearing:
-        """Range and bearing with this set-up's noise."""
-        return RangeBearing(np.diag([self.range_variance, self.bearing_variance]))
+        """Range and bearing with this set-up's noise; bearings are not wrapped."""
+        R = np.diag([self.range_variance, self.bearing_variance])
+        return RangeBearing(R, wrap=False)
 
     @property
     def z(self) -> Array:

@@ -1,0 +1,81 @@
+"""Whatever a run is given as a filter, with init, predict, update and step."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from navfilters.estimators import model_parts
+from navfilters.estimators.filter import Filter, first_state, keep, missed, seen
+from navfilters.estimators.prediction import predict_linearized
+from navfilters.estimators.state import FilterState
+from navfilters.estimators.update import absent
+from navfilters.numerics import validation
+from navfilters.types import Array, Dynamics, Gaussian, MeasurementModel
+
+
+@dataclass(frozen=True)
+class Memoryless:
+    """A filter that is one function, with a linearised prediction.
+
+    Parameters
+    ----------
+    function : callable
+        (prior, z, model) -> Gaussian.
+    """
+
+    function: Callable[..., Gaussian]
+
+    def init(self, prior: Gaussian) -> FilterState:
+        """The state before any step."""
+        return first_state(prior)
+
+    def predict(self, state: FilterState, dynamics: Dynamics, k: Array = 0) -> FilterState:
+        """The state one transition later, by :func:`predict_linearized`."""
+        dynamics = model_parts.at(dynamics, k)
+        Q = validation.given("dynamics.Q", dynamics.Q)
+        return state._replace(estimate=predict_linearized(state.estimate, dynamics, Q))
+
+    def update(
+        self, state: FilterState, z: Array, sensor: MeasurementModel, k: Array = 0
+    ) -> FilterState:
+        """The state after a measurement; as it was where anything of z is NaN."""
+        z, sensor = seen(validation.given("z", z), sensor, k)
+        gone, estimate = absent(z), self.function(state.estimate, z, sensor)
+        if gone is not None:
+            some = gone.__array_namespace__().any(gone, axis=-1)
+            estimate = keep(some, state.estimate, estimate)
+        return FilterState(estimate, missed(state, gone))
+
+    step = Filter.step
+
+
+def as_filter(estimator: Any) -> Any:
+    """A filter's protocol for whatever a run is given.
+
+    Parameters
+    ----------
+    estimator : Filter, partial of one, object with ``init`` and ``step``, or callable
+        A callable is (prior, z, model) -> Gaussian.
+
+    Returns
+    -------
+    object
+        With ``init(prior) -> state`` and ``step(state, z, sensor, dynamics, k) -> state``, where
+        ``state.estimate`` is a Gaussian.
+
+    Raises
+    ------
+    TypeError
+        Anything else.
+    """
+    if hasattr(estimator, "init") and hasattr(estimator, "step"):
+        return estimator
+    if isinstance(estimator, partial) and isinstance(estimator.func, Filter):
+        return estimator.func.having(**estimator.keywords)
+    if callable(estimator) and not isinstance(estimator, type):
+        return Memoryless(estimator)
+    raise TypeError(
+        "estimator must be a filter such as FILTERS['EKF'], an object with init and step, or "
+        f"callable as estimator(prior, z, model); found {estimator!r}"
+    )

@@ -1,0 +1,19 @@
+"""The filters by name."""
+
+from navfilters.estimators import variants
+from navfilters.estimators.filter import Filter
+from navfilters.estimators.moments import linearized, second_order, unscented
+
+FILTERS: dict[str, Filter] = {
+    "EKF": Filter(linearized),
+    "B-EKF 1": Filter(linearized, variants.bump_linear),
+    "B-EKF 2": Filter(linearized, variants.bump_circular),
+    "B-EKF 3": Filter(linearized, variants.bump_equivalent),
+    "B-EKF 4": Filter(linearized, variants.bump_state),
+    "mtSOF": Filter(second_order),
+    "B-mtSOF": Filter(second_order, variants.bump_linear),
+    "UKF": Filter(unscented),
+    "B-UKF": Filter(unscented, variants.bump_predicted),
+    "UKFz": Filter(unscented, variants.expect_at_mean),
+}
+"""The ten filters of perea2007, in its order and by its names, with Joseph's update."""

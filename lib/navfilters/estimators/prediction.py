@@ -1,0 +1,101 @@
+"""How a filter predicts its state: the approximation of its moments, with f in the place of h."""
+
+from navfilters.estimators.model_parts import difference, moved, retract, transition
+from navfilters.estimators.sigma_points import SigmaPoints, offsets, root_of
+from navfilters.numerics.small_matrices import outer_sum
+from navfilters.numerics.state_derivatives import first_derivative
+from navfilters.types import Array, Dynamics, Gaussian
+
+
+def predict_linearized(estimate: Gaussian, dynamics: Dynamics, Q: Array) -> Gaussian:
+    """The state one transition later.
+
+    x' = f(x),   P' = F P F^T + Q
+
+    Parameters
+    ----------
+    estimate : Gaussian
+        mean (..., n), cov (..., n, n).
+    dynamics : Dynamics
+    Q : array (..., n, n)
+        Covariance of the process noise: the dynamics', or a rule's in its place.
+
+    Returns
+    -------
+    Gaussian
+
+    References
+    ----------
+    xiong2009, Eqs. (3), (4); lecture16, Eqs. (81)-(84); pogorelsky2020, Eqs. (8)-(12).
+    """
+    x, F, W = transition(dynamics, estimate, Q)
+    P = F @ estimate.cov @ F.mT + W
+    return Gaussian(x, (P + P.mT) / 2)
+
+
+def predict_second_order(estimate: Gaussian, dynamics: Dynamics, Q: Array) -> Gaussian:
+    """As :func:`predict_linearized`, with the bias of the modified truncated second-order filter.
+
+    x' = f(x) + b,   P' = F P F^T + Q - b b^T,   b_i = tr(f_i'' P) / 2
+
+    Parameters
+    ----------
+    estimate : Gaussian
+    dynamics : Dynamics
+        Its Hessian is ``hessian(x)``, (..., n, n, n), or by complex step of F.
+    Q : array (..., n, n)
+
+    Returns
+    -------
+    Gaussian
+    """
+    first = predict_linearized(estimate, dynamics, Q)
+    x = estimate.mean
+    if hasattr(dynamics, "hessian"):
+        second = dynamics.hessian(x)
+    else:
+        second = first_derivative(lambda y: transition_jacobian(dynamics, y), x, "F of dynamics")
+    xp = second.__array_namespace__()
+    b = xp.sum(second * estimate.cov[..., None, :, :], axis=(-2, -1)) / 2
+    squares = b[..., :, None] * b[..., None, :]
+    return Gaussian(retract(dynamics, first.mean, b), first.cov - squares)
+
+
+def transition_jacobian(dynamics: Dynamics, x: Array) -> Array:
+    """F at x, (..., n, n)."""
+    if hasattr(dynamics, "transition"):
+        return dynamics.transition(x)[1]
+    return first_derivative(dynamics.f, x, "dynamics.f")
+
+
+def predict_unscented(
+    estimate: Gaussian, dynamics: Dynamics, Q: Array, *, points: SigmaPoints = SigmaPoints()
+) -> Gaussian:
+    """The state one transition later, by sigma points.
+
+    x' = sum W_m f(X),   P' = Q + sum W_c (f(X) - x')(f(X) - x')^T
+
+    Parameters
+    ----------
+    estimate : Gaussian
+    dynamics : Dynamics
+    Q : array (..., n, n)
+    points : SigmaPoints
+
+    Returns
+    -------
+    Gaussian
+        NaN where cov has no square root.
+    """
+    x, n = estimate.mean, estimate.cov.shape[-1]
+    X = retract(dynamics, x, offsets(estimate, points, root_of(estimate.cov, points.root)[0]))
+    Y = moved(dynamics, X)
+    xp = Y.__array_namespace__()
+    _, _, W0_c, W_i = points.weights(n, xp)
+    shift = W_i[..., None] * xp.sum(difference(dynamics, Y[1:], Y[0]), axis=0)
+    mean = retract(dynamics, Y[0], shift)
+    dY = difference(dynamics, Y, mean)
+    W = transition(dynamics, estimate, Q)[2] if hasattr(dynamics, "propagate") else Q
+    W0_c, W_i = W0_c[..., None, None], W_i[..., None, None]
+    P = W + W0_c * outer_sum(dY[:1], dY[:1]) + W_i * outer_sum(dY[1:], dY[1:])
+    return Gaussian(mean, (P + P.mT) / 2)
