@@ -119,7 +119,7 @@ def test_attitude_definitions():
 )
 def test_deviations_at_600_s(results, case, predicted, fell):
     result = results[case]
-    spread = sample_deviation(result.errors[:, -1], result.covariances[:, -1])
+    spread = sample_deviation(result.errors[-1], result.covariances[-1], runs_axis=0)
     assert_allclose(spread.predicted[:3], predicted, rtol=0.03)
     assert_allclose(100 * (1 - spread.predicted[:2] / 1000), fell, atol=0.3)
     inside = (spread.low < spread.predicted) & (spread.predicted < spread.high)
@@ -130,7 +130,8 @@ def test_deviations_at_600_s(results, case, predicted, fell):
 
 def test_only_the_second_case_is_consistent_by_nees(results):
     one, two = (
-        mean_nees(results[c].errors[:, -1], results[c].covariances[:, -1]) for c in ("TC-1", "TC-2")
+        mean_nees(results[c].errors[-1], results[c].covariances[-1], runs_axis=0)
+        for c in ("TC-1", "TC-2")
     )
     assert 12 < one.mean < 20  # about 16
     assert two.low < two.mean < two.high
@@ -140,16 +141,18 @@ def test_rotation_about_the_boresight_is_not_seen(results):
     """The third misalignment keeps its prior and the small random walk."""
     for case, prior in (("TC-1", 0.1), ("TC-2", 0.01)):
         deviation = np.sqrt(np.diagonal(results[case].covariances, axis1=-2, axis2=-1))
-        last = np.rad2deg(deviation[:, -1, 6:])
+        last = np.rad2deg(deviation[-1, :, 6:])
         assert_allclose(last[:, 2], prior, rtol=0.02)
         assert (last[:, 0] < 0.25 * prior).all()
 
 
 def test_the_first_case_needs_the_underweighting_and_the_second_does_not(results):
     free = monte_carlo(replace(CASES["TC-1"], underweighting=0.0))
-    spread = sample_deviation(free.errors[:, -1], free.covariances[:, -1])
+    spread = sample_deviation(free.errors[-1], free.covariances[-1], runs_axis=0)
     assert spread.predicted[1] < spread.low[1]  # y
-    held = sample_deviation(results["TC-1"].errors[:, -1], results["TC-1"].covariances[:, -1])
+    held = sample_deviation(
+        results["TC-1"].errors[-1], results["TC-1"].covariances[-1], runs_axis=0
+    )
     assert held.low[1] < held.predicted[1]
 
 
@@ -175,7 +178,7 @@ def test_the_curved_measurement_is_what_breaks_the_first_case():
         return mekf_update(state, measurement, Straight(model, next(count)), **options)
 
     result = monte_carlo(setup, runs=60, update=straight)
-    total = mean_nees(result.errors[:, -1], result.covariances[:, -1])
+    total = mean_nees(result.errors[-1], result.covariances[-1], runs_axis=0)
     assert total.low < total.mean < total.high
 
 
@@ -183,26 +186,24 @@ def test_three_updates_and_a_coast():
     """8.33, 16.67 and 25 s, then to 41.67 s; the same first three as in the long flight."""
     few, many = monte_carlo("TC-1", 3, runs=4), monte_carlo("TC-1", 6, runs=4)
     assert_allclose(few.times, [0, 25 / 3, 50 / 3, 25, 125 / 3])
-    assert_array_equal(few.errors[:, :4], many.errors[:, :4])
-    assert_array_equal(few.covariances[:, :4], many.covariances[:, :4])
-    assert few.innovations.shape == (4, 3, 4)
-    grown = np.diagonal(few.covariances[:, 4] - few.covariances[:, 3], axis1=-2, axis2=-1)
+    assert_array_equal(few.errors[:4], many.errors[:4])
+    assert_array_equal(few.covariances[:4], many.covariances[:4])
+    assert few.innovations.shape == (3, 4, 4)
+    grown = np.diagonal(few.covariances[4] - few.covariances[3], axis1=-2, axis2=-1)
     assert (grown[:, 6:] > 0).all()
     assert_allclose(grown[:, 6:], 3.4e-13 * 50 / 3, rtol=1e-3)
 
 
 def test_first_errors_are_the_drawn_ones():
     result, drawn = monte_carlo("TC-2", 1, runs=3, seed=5), noise(3, 1, 5)
-    assert_allclose(
-        result.errors[:, 0], np.sqrt(np.diag(CASES["TC-2"].P0)) * drawn.first, rtol=1e-6
-    )
-    assert_array_equal(result.covariances[:, 0], np.broadcast_to(CASES["TC-2"].P0, (3, 9, 9)))
+    assert_allclose(result.errors[0], np.sqrt(np.diag(CASES["TC-2"].P0)) * drawn.first, rtol=1e-6)
+    assert_array_equal(result.covariances[0], np.broadcast_to(CASES["TC-2"].P0, (3, 9, 9)))
 
 
 def test_a_run_gives_the_same_digits_in_any_company():
     among, alone = monte_carlo("TC-1", 4, runs=9), monte_carlo("TC-1", 4, runs=[7])
     for name in ("errors", "covariances", "innovations", "S"):
-        assert_array_equal(getattr(among, name)[7], getattr(alone, name)[0])
+        assert_array_equal(getattr(among, name)[:, 7], getattr(alone, name)[:, 0])
     assert (monte_carlo("TC-1", 4, runs=[7], seed=1).errors != alone.errors).any()
 
 
@@ -257,14 +258,14 @@ def test_a_plain_loop_over_one_run():
         dx, A = K @ y, np.eye(9) - K @ H
         x, P = x + dx[:6], A @ P @ A.T + K @ R @ K.T
         attitude = attitude * Rotation.from_rotvec(dx[6:])
-        assert_allclose(result.innovations[0, k - 1] / scale, y / scale, atol=1e-6)
-        assert_allclose(result.errors[0, k, :6], flight.x[k] - x, rtol=1e-6, atol=1e-5)
+        assert_allclose(result.innovations[k - 1, 0] / scale, y / scale, atol=1e-6)
+        assert_allclose(result.errors[k, 0, :6], flight.x[k] - x, rtol=1e-6, atol=1e-5)
         true = Rotation.from_quat(q_true[0, k])
         turned = (attitude.inv() * true).as_rotvec()
-        assert_allclose(result.errors[0, k, 6:], turned, rtol=0, atol=1e-10)
+        assert_allclose(result.errors[k, 0, 6:], turned, rtol=0, atol=1e-10)
     deviation = np.sqrt(np.diag(P))
     assert_allclose(
-        result.covariances[0, -1] / deviation / deviation[:, None],
+        result.covariances[-1, 0] / deviation / deviation[:, None],
         P / deviation / deviation[:, None],
         atol=1e-5,
     )
@@ -281,12 +282,12 @@ def test_images_that_are_not_matched_leave_dead_reckoning():
         return Measurement(np.where(blind[:, None], np.nan, seen.r_f), *seen[1:])
 
     got, wanted = monte_carlo(setup, 5, 3, measure=lost), monte_carlo(setup, 5, 3)
-    assert_array_equal(got.errors[[0, 2]], wanted.errors[[0, 2]])
-    assert np.isnan(got.innovations[1]).any(axis=-1).all()
-    x = flight.x[0] - got.errors[1, 0, :6]
+    assert_array_equal(got.errors[:, [0, 2]], wanted.errors[:, [0, 2]])
+    assert np.isnan(got.innovations[:, 1]).any(axis=-1).all()
+    x = flight.x[0] - got.errors[0, 1, :6]
     x, P = setup.orbit.propagate(x, setup.P0, 50)
-    assert_allclose(got.errors[1, -1, :6], flight.x[5] - x, atol=1e-6)
-    assert_allclose(got.covariances[1, -1], P, rtol=1e-9, atol=1e-6)
+    assert_allclose(got.errors[-1, 1, :6], flight.x[5] - x, atol=1e-6)
+    assert_allclose(got.covariances[-1, 1], P, rtol=1e-9, atol=1e-6)
 
 
 def test_options_reach_the_filter():
@@ -306,7 +307,7 @@ def test_options_reach_the_filter():
         {"walk": False},
     ):
         other = monte_carlo(replace(CASES["TC-1"], **change), 3, 2)
-        assert (other.errors[:, 1:] != base.errors[:, 1:]).any(), change
+        assert (other.errors[1:] != base.errors[1:]).any(), change
     far = monte_carlo(replace(CASES["TC-1"], gamma=1e9), 3, 2)
     none = monte_carlo(replace(CASES["TC-1"], underweighting=0.0), 3, 2)
     assert_array_equal(far.errors, none.errors)

@@ -76,13 +76,13 @@ class MonteCarlo:
     ----------
     times : array (t,)
         0, after each update, and the end of a coast, s.
-    errors : array (runs, t, 9)
+    errors : array (t, runs, 9)
         Truth minus estimate: position, m, velocity, m/s, misalignment as a rotation vector, rad.
-    covariances : array (runs, t, 9, 9)
+    covariances : array (t, runs, 9, 9)
         What the filter believed of them.
-    innovations : array (runs, updates, 4)
+    innovations : array (updates, runs, 4)
         Measured minus expected; NaN where there was no measurement.
-    S : array (runs, updates, 4, 4)
+    S : array (updates, runs, 4, 4)
         What the filter believed of them, underweighting included.
     """
 
@@ -177,10 +177,10 @@ def monte_carlo(
     errors = [_error(flight.x[k], q_true[:, k], state) for k, state in after]
     return MonteCarlo(
         flight.times[[k for k, _ in after]],
-        np.stack(errors, axis=1),
-        np.stack([state.P for _, state in after], axis=1),
-        np.stack([each.innovation for each in made], axis=1),
-        np.stack([each.S for each in made], axis=1),
+        np.stack(errors),
+        np.stack([state.P for _, state in after]),
+        np.stack([each.innovation for each in made]),
+        np.stack([each.S for each in made]),
     )
 
 
@@ -218,8 +218,8 @@ def open_table(
     """
     result = monte_carlo(case, runs=runs, seed=seed, progress=progress)
     first = of_case(case).sigma_r
-    spread = sample_deviation(result.errors[:, -1], result.covariances[:, -1])
-    total = mean_nees(result.errors[:, -1], result.covariances[:, -1])
+    at_end = result.errors[-1], result.covariances[-1]
+    spread, total = sample_deviation(*at_end, runs_axis=0), mean_nees(*at_end, runs_axis=0)
     lines = [f"{'':6}{'predicted':>11}{'sample (95 %)':>25}{'fell by':>10}{'paper':>18}"]
     for i, axis in enumerate("xyz"):
         low, sample, high = (f"{s[i]:.1f}" for s in (spread.low, spread.sample, spread.high))
