@@ -14,13 +14,20 @@ from navfilters.estimators.multiplicative import MekfState, mekf_update
 from navfilters.papers import pogorelsky2020
 from navfilters.papers.pogorelsky2020 import __main__ as command
 from navfilters.papers.pogorelsky2020.experiment import CASES, Setup
+from navfilters.papers.pogorelsky2020.final_nees import final_nees, nees_line
+from navfilters.papers.pogorelsky2020.linearised import FixedModel, linearised_flight
 from navfilters.papers.pogorelsky2020.noise_draws import misalignment, noise
-from navfilters.papers.pogorelsky2020.open_loop import SimulatedImages, monte_carlo
+from navfilters.papers.pogorelsky2020.open_loop import (
+    SimulatedImages,
+    estimation_error,
+    monte_carlo,
+    simulate_images,
+)
 from navfilters.papers.pogorelsky2020.true_flight import _attitude, _circular, initial_state, truth
 from navfilters.runs.consistency import mean_nees, sample_deviation
 from navfilters.space.frames import ecef_to_geodetic, ellipsoid_intersection
 from navfilters.space.image_measurement import Measurement
-from navfilters.space.quaternions import conjugate, product, rotation_vector
+from navfilters.space.quaternions import rotation_vector
 
 R0 = np.array([-1108465.150, -6100044.949, 3397134.666])
 V0 = np.array([-1003.9419331, 3801.3289491, 6498.2536689])
@@ -158,26 +165,16 @@ def test_the_first_case_needs_the_underweighting_and_the_second_does_not(results
 
 def test_the_curved_measurement_is_what_breaks_the_first_case():
     """With residuals that are linear in the error, about the estimate, the same filter passes."""
-    setup, count = CASES["TC-1"], iter(range(1, 73))
-    flight, q_true = truth(), misalignment(setup, noise(60, 72).walk)
+    images = simulate_images("TC-1", 60)
 
-    class Straight:
-        def __init__(self, model, k):
-            self.model, self.k = model, k
+    def straight(state, told, model, **options):
+        image, true = told
+        _, H, R = model.linearize(state, image)
+        error = estimation_error(true, state)
+        y = model.linearize(true, image)[0] + (H @ error[..., None])[..., 0]
+        return mekf_update(state, image, FixedModel(y, H, R), **options)
 
-        def linearize(self, state, measurement):
-            x, q = flight.x[self.k], q_true[:, self.k]
-            here = MekfState(x[:3], x[3:], q, state.P)
-            from_truth = self.model.linearize(here, measurement)[0]
-            _, H, R = self.model.linearize(state, measurement)
-            turned = rotation_vector(product(q, conjugate(state.q_mu)))
-            error = np.concatenate([x[:3] - state.r, x[3:] - state.v, turned], axis=-1)
-            return from_truth + (H @ error[..., None])[..., 0], H, R
-
-    def straight(state, measurement, model, **options):
-        return mekf_update(state, measurement, Straight(model, next(count)), **options)
-
-    result = monte_carlo(setup, runs=60, update=straight)
+    result = monte_carlo("TC-1", runs=60, measure=images.with_truth, update=straight)
     total = mean_nees(result.errors[-1], result.covariances[-1], runs_axis=0)
     assert total.low < total.mean < total.high
 
@@ -380,3 +377,60 @@ REFUSED = {
 def test_bad_input_is_refused_by_name(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_simulated_images_are_those_of_the_runs():
+    """With the truth beside each of them."""
+    setup, flight = CASES["TC-2"], truth(CASES["TC-2"], 5)
+    images = simulate_images("TC-2", 3, 4, flight=flight)
+    got = monte_carlo("TC-2", 2, 3, 4, flight=flight, measure=images)
+    assert_array_equal(got.errors, monte_carlo("TC-2", 2, 3, 4, flight=flight).errors)
+    drawn = noise(3, 5, 4)
+    wanted = SimulatedImages(setup, flight, misalignment(setup, drawn.walk), drawn)(2, None)
+    state = MekfState(np.zeros((3, 3)), np.zeros((3, 3)), images.q_mu[:, 0], np.eye(9))
+    image, true = images.with_truth(2, state)
+    assert_array_equal(image.r_f, wanted.r_f)
+    assert_array_equal(true.r, flight.x[2, :3])
+    assert_array_equal(true.q_mu, images.q_mu[:, 2])
+    error = estimation_error(true, state)
+    assert_array_equal(error[:, :6], np.broadcast_to(flight.x[2], (3, 6)))
+    assert (np.abs(error[:, 6:]) < 1e-4).all()
+
+
+def test_the_flight_linearised_is_the_filters_own_along_the_truth():
+    """Its covariance is that of a run without errors, and its transitions carry small ones."""
+    setup, flight = CASES["TC-1"], truth(CASES["TC-1"], 12)
+    legs, P = linearised_flight(setup, flight, 12)
+    perfect = replace(
+        simulate_images(setup, 1, flight=flight), q_mu=np.tile([0, 0, 0, 1.0], (1, 13, 1))
+    )
+    zero = perfect.noise._replace(**{n: 0 * v for n, v in perfect.noise._asdict().items()})
+    perfect = replace(perfect, noise=zero)
+    state = MekfState(flight.x[0, :3], flight.x[0, 3:], perfect.q_mu[0, 0], setup.P0)
+    for k, leg in enumerate(legs, start=1):
+        x, before = setup.orbit.propagate(flight.x[k - 1], state.P, setup.steps)
+        assert_allclose(leg.F @ state.P @ leg.F.T + leg.Q, before, rtol=1e-12, atol=1e-12)
+        model = replace(setup.geometry, T_e_b=flight.T_e_b[k])
+        b = 0.2 if k <= 10 else 0.0
+        state = MekfState(x[:3], x[3:], perfect.q_mu[0, 0], before)
+        assert_allclose(leg.extra, b * leg.H @ before @ leg.H.T)
+        state = mekf_update(state, perfect(k, None), model, underweighting=b).state
+        state = MekfState(flight.x[k, :3], flight.x[k, 3:], perfect.q_mu[0, 0], state.P[0])
+    assert_allclose(P, state.P, rtol=1e-5, atol=1e-9)
+    nudge = np.array([10.0, 0, 0, 0, 0, 0.1])
+    moved = setup.orbit.path(flight.x[0] + nudge, setup.steps)[-1] - flight.x[1]
+    assert_allclose(legs[0].F[:6, :6] @ nudge, moved, atol=1e-3)
+
+
+@pytest.mark.parametrize("images", [0, 6])
+def test_a_flight_is_linearised_as_far_as_it_goes(images):
+    with pytest.raises(ValueError, match="images must be"):
+        linearised_flight(Setup(), truth(Setup(), 5), images)
+
+
+def test_nees_at_the_end_in_numbers_and_in_words(results):
+    values = final_nees(results["TC-1"])
+    assert values.shape == (100,)
+    total = mean_nees(results["TC-1"].errors, results["TC-1"].covariances, runs_axis=1)
+    assert_allclose(values.mean(), total.mean[-1])
+    assert nees_line(np.array([1.0, 9.0, 9.0, 41.0])) == " 15.0 ± 15.1, median  9.0, 25.0 %"
