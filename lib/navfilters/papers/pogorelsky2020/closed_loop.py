@@ -244,13 +244,13 @@ def summary(closed: MonteCarlo, opened: MonteCarlo) -> str:
     """
     lines = [f"{'':12}{'closed loop':>24}{'open loop':>24}"]
     lines.append(f"{'':12}{'predicted':>12}{'sample':>12}{'predicted':>12}{'sample':>12}")
-    at = UPDATES
-    spreads = [sample_deviation(m.errors[:, at], m.covariances[:, at]) for m in (closed, opened)]
+    after = [(m.errors[UPDATES], m.covariances[UPDATES]) for m in (closed, opened)]
+    spreads = [sample_deviation(*pair, runs_axis=0) for pair in after]
     for i, axis in enumerate("xyz"):
         cells = "".join(f"{s.predicted[i]:12.1f}{s.sample[i]:12.1f}" for s in spreads)
         lines.append(f"{axis} (m)      {cells}")
-    totals = [mean_nees(m.errors[:, at], m.covariances[:, at]) for m in (closed, opened)]
+    totals = [mean_nees(*pair, runs_axis=0) for pair in after]
     lines.append(f"{'NEES':12}" + "".join(f"{'':12}{t.mean:12.1f}" for t in totals))
     failed = int(np.isnan(closed.innovations).any(axis=-1).sum())
-    lines.append(f"{failed} of {closed.innovations.shape[0] * UPDATES} images failed")
+    lines.append(f"{failed} of {closed.innovations.shape[1] * UPDATES} images failed")
     return "\n".join(lines)

@@ -67,6 +67,46 @@ class SimulatedImages:
             np.linalg.norm(x[3:]) + setup.sigma_speed * self.noise.speed[:, k - 1],
         )
 
+    def with_truth(self, k: int, state: MekfState) -> tuple[Measurement, MekfState]:
+        """The image and the true state that it was made at, for an update that is told the truth.
+
+        Parameters
+        ----------
+        k, state
+            As for a call.
+
+        Returns
+        -------
+        tuple of Measurement, MekfState
+            The truth with the covariance of ``state``.
+        """
+        x = self.flight.x[k]
+        return self(k, state), MekfState(x[:3], x[3:], self.q_mu[:, k], state.P)
+
+
+def simulate_images(
+    case: str | Setup = "TC-1",
+    runs: int | Sequence[int] = 100,
+    seed: int = 0,
+    *,
+    flight: Truth | None = None,
+) -> SimulatedImages:
+    """The images that ``monte_carlo`` measures by default: the same draws for the same arguments.
+
+    Parameters
+    ----------
+    case, runs, seed, flight
+        As for :func:`monte_carlo`; a flight of 72 intervals by default.
+
+    Returns
+    -------
+    SimulatedImages
+    """
+    setup = of_case(case)
+    flight = truth(setup) if flight is None else flight
+    drawn = noise(runs, len(flight.times) - 1, seed)
+    return SimulatedImages(setup, flight, misalignment(setup, drawn.walk), drawn)
+
 
 @dataclass(frozen=True, eq=False)
 class MonteCarlo:
@@ -76,13 +116,13 @@ class MonteCarlo:
     ----------
     times : array (t,)
         0, after each update, and the end of a coast, s.
-    errors : array (runs, t, 9)
+    errors : array (t, runs, 9)
         Truth minus estimate: position, m, velocity, m/s, misalignment as a rotation vector, rad.
-    covariances : array (runs, t, 9, 9)
+    covariances : array (t, runs, 9, 9)
         What the filter believed of them.
-    innovations : array (runs, updates, 4)
+    innovations : array (updates, runs, 4)
         Measured minus expected; NaN where there was no measurement.
-    S : array (runs, updates, 4, 4)
+    S : array (updates, runs, 4, 4)
         What the filter believed of them, underweighting included.
     """
 
@@ -151,10 +191,9 @@ def monte_carlo(
     intervals = len(flight.times) - 1
     if intervals < updates:
         raise ValueError(f"flight must last {updates} intervals, one an update; found {intervals}")
-    drawn = noise(runs, intervals, seed)
-    q_true = misalignment(setup, drawn.walk)
-    measure = SimulatedImages(setup, flight, q_true, drawn) if measure is None else measure
-    state = _first_estimate(setup, flight.x[0], q_true[:, 0], drawn.first)
+    images = simulate_images(setup, runs, seed, flight=flight)
+    measure = images if measure is None else measure
+    state = _first_estimate(setup, flight.x[0], images.q_mu[:, 0], images.noise.first)
     orbit, geometry, after = setup.orbit, setup.geometry, [(0, state)]
     made: list[MekfUpdate] = []
     for k in progress(range(1, intervals + 1)):
@@ -174,13 +213,16 @@ def monte_carlo(
             state = made[-1].state
         if k <= updates or k == intervals:
             after.append((k, state))
-    errors = [_error(flight.x[k], q_true[:, k], state) for k, state in after]
+    errors = [
+        estimation_error(MekfState(flight.x[k, :3], flight.x[k, 3:], images.q_mu[:, k], s.P), s)
+        for k, s in after
+    ]
     return MonteCarlo(
         flight.times[[k for k, _ in after]],
-        np.stack(errors, axis=1),
-        np.stack([state.P for _, state in after], axis=1),
-        np.stack([each.innovation for each in made], axis=1),
-        np.stack([each.S for each in made], axis=1),
+        np.stack(errors),
+        np.stack([state.P for _, state in after]),
+        np.stack([each.innovation for each in made]),
+        np.stack([each.S for each in made]),
     )
 
 
@@ -192,10 +234,21 @@ def _first_estimate(setup: Setup, x: Array, q_mu: Array, drawn: Array) -> MekfSt
     return MekfState(x[:3] - error[:, :3], x[3:] - error[:, 3:6], q, P)
 
 
-def _error(x: Array, q_mu: Array, state: MekfState) -> Array:
-    """Truth minus estimate, (runs, 9)."""
-    turned = rotation_vector(product(q_mu, conjugate(state.q_mu)))
-    return np.concatenate([x[:3] - state.r, x[3:] - state.v, turned], axis=-1)
+def estimation_error(true: MekfState, state: MekfState) -> Array:
+    """Truth minus estimate.
+
+    Parameters
+    ----------
+    true, state : MekfState
+        Of one run or many.
+
+    Returns
+    -------
+    array (..., 9)
+        Position, m, velocity, m/s, misalignment as a rotation vector, rad.
+    """
+    turned = rotation_vector(product(true.q_mu, conjugate(state.q_mu)))
+    return np.concatenate([true.r - state.r, true.v - state.v, turned], axis=-1)
 
 
 def open_table(
@@ -218,8 +271,8 @@ def open_table(
     """
     result = monte_carlo(case, runs=runs, seed=seed, progress=progress)
     first = of_case(case).sigma_r
-    spread = sample_deviation(result.errors[:, -1], result.covariances[:, -1])
-    total = mean_nees(result.errors[:, -1], result.covariances[:, -1])
+    at_end = result.errors[-1], result.covariances[-1]
+    spread, total = sample_deviation(*at_end, runs_axis=0), mean_nees(*at_end, runs_axis=0)
     lines = [f"{'':6}{'predicted':>11}{'sample (95 %)':>25}{'fell by':>10}{'paper':>18}"]
     for i, axis in enumerate("xyz"):
         low, sample, high = (f"{s[i]:.1f}" for s in (spread.low, spread.sample, spread.high))
