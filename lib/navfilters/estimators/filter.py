@@ -106,9 +106,11 @@ class Filter:
                 f"{type(self.rule).__name__}"
             )
         self._know(options)
-        moments = self.moments(_given(prior), model, **_accepted(self.moments, options))
+        prior, z = _given(prior), validation.given("z", z)
+        moments = self.moments(prior, model, **_accepted(self.moments, options))
         changed, moments = self.variant(prior, model, moments, **_accepted(self.variant, options))
-        return kalman_update(changed, z, moments, form=self.form, model=model)
+        updated = kalman_update(changed, z, moments, form=self.form, model=model)
+        return _kept(absent(z), prior, updated)
 
     @property
     def options(self) -> tuple[str, ...]:
@@ -211,10 +213,12 @@ class Filter:
             prior, memory, moments = self._ruled(state, z, sensor, gone)
         if moments is None:
             moments = self.moments(prior, sensor)
-        prior, moments = self.variant(prior, sensor, moments)
+        variant = model_parts.at(self.variant, k)
+        prior, moments = variant(prior, sensor, moments)
         fit(prior, z, moments)
         y = innovation(z, moments, sensor)
         estimate = correct(prior, y, moments, self.form, sensor, gone)
+        estimate = _kept(gone, state.estimate, estimate)
         return FilterState(estimate, missed(state, gone), memory, y, moments.P_zz)
 
     def _ruled(
@@ -280,8 +284,9 @@ class Filter:
         z, prior = validation.given("z", z), _given(prior)
         H, R = model.jacobian(prior.mean), model_parts.noise(model, prior.mean)
         P = prior.cov if self.rule is None else self.rule.limit(prior.cov)
-        given = getattr(self.variant, "keywords", {}) | _accepted(self.variant, options)
-        P, R = LIMITS[getattr(self.variant, "func", self.variant)](P, H, R, **given)
+        variant = model_parts.at(self.variant, 0)
+        given = getattr(variant, "keywords", {}) | _accepted(variant, options)
+        P, R = LIMITS[getattr(variant, "func", variant)](P, H, R, **given)
         weight = H.mT @ np.linalg.inv(R)
         cov = np.linalg.inv(np.linalg.inv(P) + weight @ H)
         residual = z - (H @ prior.mean[..., None])[..., 0]
@@ -312,6 +317,13 @@ def missed(state: FilterState, gone: Array | None) -> Array:
     if gone is None:
         return state.missed
     return state.missed + gone.__array_namespace__().all(gone, axis=-1)
+
+
+def _kept(gone: Array | None, before: Gaussian, after: Gaussian) -> Gaussian:
+    """The estimate as it was in the members of which nothing was measured."""
+    if gone is None:
+        return after
+    return keep(gone.__array_namespace__().all(gone, axis=-1), before, after)
 
 
 def keep(some: Array, before: Any, after: Any) -> Any:

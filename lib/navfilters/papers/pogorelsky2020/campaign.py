@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from navfilters.estimators.multiplicative import MekfState
+from navfilters.space.navigation_state import NavigationState
 from navfilters.numerics import validation
 from navfilters.papers.pogorelsky2020.acquisition import acquire, measure_directly
 from navfilters.papers.pogorelsky2020.campaign_store import Folder, Formed
@@ -174,7 +174,7 @@ class _Directly:
     images: Images
     done: Callable[[int], Any]
 
-    def __call__(self, k: int, state: MekfState) -> Measurement:
+    def __call__(self, k: int, state: NavigationState) -> Measurement:
         acquired: Acquisition | None = None
         found = []
         for run, start in enumerate(np.linalg.norm(state.v, axis=-1)):

@@ -1,50 +1,112 @@
 """The experiment of Pogorelsky et al. linearised: along its true flight, and in one update."""
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from navfilters.estimators.multiplicative import MekfState, mekf_update
+from navfilters.estimators.filter import Filter
+from navfilters.estimators.model_parts import at
 from navfilters.numerics import validation
 from navfilters.papers.pogorelsky2020.experiment import NOMINAL, Setup
 from navfilters.papers.pogorelsky2020.true_flight import Truth
 from navfilters.space.frames import ellipsoid_intersection
 from navfilters.space.image_measurement import Measurement, SarGeometry
-from navfilters.types import Array
+from navfilters.space.navigation_state import NavigationState
+from navfilters.space.pose import difference, retract
+from navfilters.types import Array, Gaussian
 
 
 class FixedModel(NamedTuple):
-    """A model whose residual, H and R are given: for an update that differs in one of them.
+    """A sensor of which H and R are given, and whose measurement is the residual.
 
     Parameters
     ----------
-    y : array (..., m)
-        Measured minus expected.
     H : array (..., m, 9)
     R : array (..., m, m)
     """
 
-    y: Array
     H: Array
     R: Array
 
-    def linearize(self, state: MekfState, measurement: Any) -> tuple[Array, Array, Array]:
-        """What was given, whatever the state and the measurement.
+    def h(self, x: Array) -> Array:
+        """Zero, (..., m)."""
+        return x[..., :1] * np.zeros(self.H.shape[-2])
+
+    def jacobian(self, x: Array) -> Array:
+        """H."""
+        return self.H
+
+    retract = staticmethod(retract)
+    difference = staticmethod(difference)
+
+
+class Seen(NamedTuple):
+    """An image as a filter sees it: what :class:`Altered` is asked to change.
+
+    Parameters
+    ----------
+    k : int
+        Number of the image, from 1.
+    state : NavigationState
+        What the filter predicts.
+    image : Measurement
+    geometry : SarGeometry
+    """
+
+    k: int
+    state: NavigationState
+    image: Measurement
+    geometry: SarGeometry
+
+    def linearise(self, state: NavigationState | None = None) -> tuple[Array, Array, Array]:
+        """Residual (..., 4), H (..., 4, 9) and R + B (..., 4, 4), at the filter's state or another.
 
         Parameters
         ----------
-        state : MekfState
-        measurement
-            Not used.
+        state : NavigationState, optional
 
         Returns
         -------
         tuple of array
-            y, H, R.
         """
-        return self.y, self.H, self.R
+        state = self.state if state is None else state
+        y, pixel = self.geometry.given(self.image.z)
+        x = state.x
+        return y - pixel.h(x), pixel.jacobian(x), pixel.noise(x)
+
+
+@dataclass(frozen=True, eq=False)
+class Altered:
+    """A filter that is told another residual, H or R than its images'.
+
+    Parameters
+    ----------
+    filter : Filter
+    change : callable
+        (Seen) -> (y, H, R).
+    """
+
+    filter: Any
+    change: Callable[[Seen], tuple[Array, Array, Array]]
+
+    def init(self, prior: Gaussian) -> Any:
+        """As of ``filter``."""
+        return self.filter.init(prior)
+
+    def predict(self, state: Any, dynamics: Any, k: int = 0) -> Any:
+        """As of ``filter``."""
+        return self.filter.predict(state, dynamics, k)
+
+    def update(self, state: Any, z: Array, sensor: Any, k: int = 0) -> Any:
+        """As of ``filter``, with what was changed."""
+        own = NavigationState.of(state.estimate.mean)
+        y, H, R = self.change(Seen(k + 1, own, Measurement.of(z), at(sensor, k)))
+        return self.filter.update(state, y, FixedModel(H, R), k)
+
+    step = Filter.step
 
 
 class Leg(NamedTuple):
@@ -106,9 +168,12 @@ def linearised_flight(setup: Setup, flight: Truth, images: int = 72) -> tuple[li
         model = replace(setup.geometry, T_e_b=flight.T_e_b[k])
         pixel = ellipsoid_intersection(r, model.boresight(NOMINAL))
         image = Measurement(pixel, np.linalg.norm(pixel - r), np.linalg.norm(v))
-        state = MekfState(r, v, NOMINAL, before)
-        _, H, R = model.linearize(state, image)
+        state = NavigationState(r, v, NOMINAL)
+        _, H, R = Seen(k, state, image, model).linearise()
         b = setup.underweighting if k <= setup.underweighted else 0.0
         legs.append(Leg(F, before - F @ P @ F.T, H, R, b * H @ before @ H.T, image, model))
-        P = mekf_update(state, image, model, underweighting=b).state.P
+        estimator = setup.mekf
+        P = estimator.update(
+            estimator.init(Gaussian(state.x, before)), image.z, model, k - 1
+        ).estimate.cov
     return legs, P

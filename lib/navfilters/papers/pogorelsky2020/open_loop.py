@@ -2,19 +2,23 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from navfilters.estimators.multiplicative import MekfState, MekfUpdate, mekf_update
+from navfilters.estimators.state import FilterState
 from navfilters.numerics import validation
 from navfilters.papers.pogorelsky2020.experiment import PAPER, Setup, of_case
 from navfilters.papers.pogorelsky2020.noise_draws import Noise, misalignment, noise
 from navfilters.papers.pogorelsky2020.true_flight import Truth, truth
 from navfilters.runs.consistency import mean_nees, sample_deviation
+from navfilters.runs.loop import run
 from navfilters.space.frames import east_north_up, ellipsoid_intersection
 from navfilters.space.image_measurement import Measurement
-from navfilters.space.quaternions import conjugate, from_rotation_vector, product, rotation_vector
-from navfilters.types import Array
+from navfilters.space.image_sensor import SarPass
+from navfilters.space.navigation_state import NavigationState
+from navfilters.space.pose import difference, retract
+from navfilters.types import Array, Gaussian
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +43,14 @@ class SimulatedImages:
     q_mu: Array
     noise: Noise
 
-    def __call__(self, k: int, state: MekfState) -> Measurement:
+    def __call__(self, k: int, state: NavigationState) -> Measurement:
         """The image after interval k; it does not depend on the state, a focused one would.
 
         Parameters
         ----------
         k : int
             From 1.
-        state : MekfState
+        state : NavigationState
             What the filter predicts.
 
         Returns
@@ -67,21 +71,20 @@ class SimulatedImages:
             np.linalg.norm(x[3:]) + setup.sigma_speed * self.noise.speed[:, k - 1],
         )
 
-    def with_truth(self, k: int, state: MekfState) -> tuple[Measurement, MekfState]:
-        """The image and the true state that it was made at, for an update that is told the truth.
+    def true_state(self, k: int) -> NavigationState:
+        """The state that the image after interval k is made at.
 
         Parameters
         ----------
-        k, state
-            As for a call.
+        k : int
+            From 1.
 
         Returns
         -------
-        tuple of Measurement, MekfState
-            The truth with the covariance of ``state``.
+        NavigationState
         """
         x = self.flight.x[k]
-        return self(k, state), MekfState(x[:3], x[3:], self.q_mu[:, k], state.P)
+        return NavigationState(x[:3], x[3:], self.q_mu[:, k])
 
 
 def simulate_images(
@@ -140,8 +143,8 @@ def monte_carlo(
     seed: int = 0,
     *,
     flight: Truth | None = None,
-    measure: Callable[[int, MekfState], Measurement] | None = None,
-    update: Callable[..., MekfUpdate] = mekf_update,
+    measure: Callable[[int, NavigationState], Measurement] | None = None,
+    estimator: Any = None,
     progress: Callable[[Iterable], Iterable] = iter,
 ) -> MonteCarlo:
     """All runs of a test case in one batch.
@@ -165,8 +168,8 @@ def monte_carlo(
     measure : callable, optional
         (k, predicted state) -> Measurement of update k, from 1; by default ``SimulatedImages``. A
         NaN in it is an image that was not matched.
-    update : callable
-        Called as ``mekf_update`` is.
+    estimator : Filter, optional
+        With ``init``, ``predict`` and ``update``; the set-up's ``mekf`` by default.
     progress : callable
         Wraps the iterable of intervals.
 
@@ -193,62 +196,41 @@ def monte_carlo(
         raise ValueError(f"flight must last {updates} intervals, one an update; found {intervals}")
     images = simulate_images(setup, runs, seed, flight=flight)
     measure = images if measure is None else measure
-    state = _first_estimate(setup, flight.x[0], images.q_mu[:, 0], images.noise.first)
-    orbit, geometry, after = setup.orbit, setup.geometry, [(0, state)]
-    made: list[MekfUpdate] = []
-    for k in progress(range(1, intervals + 1)):
-        x = np.concatenate([state.r, state.v], axis=-1)
-        x, P = orbit.propagate(x, state.P, setup.steps)
-        state = MekfState(x[..., :3], x[..., 3:], state.q_mu, P)
-        if k <= updates:
-            made.append(
-                update(
-                    state,
-                    measure(k, state),
-                    replace(geometry, T_e_b=flight.T_e_b[k]),
-                    underweighting=setup.underweighting if k <= setup.underweighted else 0.0,
-                    gamma=setup.gamma,
-                )
-            )
-            state = made[-1].state
-        if k <= updates or k == intervals:
-            after.append((k, state))
-    errors = [
-        estimation_error(MekfState(flight.x[k, :3], flight.x[k, 3:], images.q_mu[:, k], s.P), s)
-        for k, s in after
-    ]
+    ticks = iter(progress(range(1, intervals + 1)))
+    nothing = np.full((len(images.noise.first), 5), np.nan)
+
+    def image(k: int, state: FilterState) -> Array:
+        next(ticks)
+        if k >= updates:
+            return nothing  # the filter coasts
+        return measure(k + 1, NavigationState.of(state.estimate.mean)).z
+
+    estimates, innovations, S = run(
+        setup.mekf if estimator is None else estimator,
+        _first_estimate(setup, images.true_state(0), images.noise.first),
+        image,
+        SarPass(setup.geometry, flight.T_e_b[1:]),
+        intervals,
+        dynamics=setup.dynamics,
+        record=lambda state: (state.estimate, state.innovation, state.S),
+    )
+    next(ticks, None)  # a bar that counts is done
+    kept = sorted({*range(updates + 1), intervals})
+    truths = np.stack([images.true_state(k).x for k in kept])
+    made = slice(1, updates + 1)
     return MonteCarlo(
-        flight.times[[k for k, _ in after]],
-        np.stack(errors),
-        np.stack([state.P for _, state in after]),
-        np.stack([each.innovation for each in made]),
-        np.stack([each.S for each in made]),
+        flight.times[kept],
+        difference(truths, estimates.mean[kept]),
+        estimates.cov[kept],
+        innovations[made],
+        S[made],
     )
 
 
-def _first_estimate(setup: Setup, x: Array, q_mu: Array, drawn: Array) -> MekfState:
+def _first_estimate(setup: Setup, true: NavigationState, drawn: Array) -> Gaussian:
     """The truth without a drawn error, so that truth minus estimate is that error exactly."""
     error = np.sqrt(np.diag(setup.P0)) * drawn
-    q = product(from_rotation_vector(-error[:, 6:]), q_mu)
-    P = np.broadcast_to(setup.P0, (len(drawn), 9, 9))
-    return MekfState(x[:3] - error[:, :3], x[3:] - error[:, 3:6], q, P)
-
-
-def estimation_error(true: MekfState, state: MekfState) -> Array:
-    """Truth minus estimate.
-
-    Parameters
-    ----------
-    true, state : MekfState
-        Of one run or many.
-
-    Returns
-    -------
-    array (..., 9)
-        Position, m, velocity, m/s, misalignment as a rotation vector, rad.
-    """
-    turned = rotation_vector(product(true.q_mu, conjugate(state.q_mu)))
-    return np.concatenate([true.r - state.r, true.v - state.v, turned], axis=-1)
+    return Gaussian(retract(true.x, -error), np.broadcast_to(setup.P0, (len(drawn), 9, 9)))
 
 
 def open_table(
