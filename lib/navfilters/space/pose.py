@@ -27,7 +27,7 @@ def retract(x: Array, dx: Array) -> Array:
 
     References
     ----------
-    pogorelsky2020, Eqs. (36)-(38).
+    pogorelsky2020, Eqs. (36) and (37).
     """
     xp = x.__array_namespace__()
     q = normalized(product(from_rotation_vector(dx[..., 6:]), x[..., 6:]))

@@ -45,7 +45,6 @@ from navfilters.papers.pogorelsky2020.noise_draws import Noise, misalignment, no
 from navfilters.papers.pogorelsky2020.open_loop import (
     MonteCarlo,
     SimulatedImages,
-    estimation_error,
     monte_carlo,
     open_table,
     simulate_images,
@@ -105,7 +104,6 @@ __all__ = [
     "campaign_report",
     "closed_table",
     "cut_patches",
-    "estimation_error",
     "final_nees",
     "first_lines",
     "fitted",
