@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from navfilters.space.navigation_state import NavigationState
 from navfilters.numerics import validation
 from navfilters.papers.pogorelsky2020.acquisition import acquire, measure_directly
 from navfilters.papers.pogorelsky2020.campaign_store import Folder, Formed
@@ -20,6 +19,7 @@ from navfilters.papers.pogorelsky2020.open_loop import MonteCarlo, monte_carlo
 from navfilters.runs import stored_arrays
 from navfilters.runs.progress import bar
 from navfilters.space.image_measurement import Measurement
+from navfilters.space.navigation_state import NavigationState
 
 ACQUIRING, CLIMBING = 40, 14
 """What the raw data of an image and a climb with its match cost, in images: for the time left."""

@@ -9,7 +9,8 @@ from navfilters.estimators.filter import Filter
 from navfilters.estimators.moments import linearized
 from navfilters.estimators.variants import Underweighting
 from navfilters.numerics import validation
-from navfilters.space.earth_fixed_orbit import EARTH_RATE, EarthFixedNavigation, EarthFixedOrbit
+from navfilters.space.earth_fixed_navigation import EarthFixedNavigation
+from navfilters.space.earth_fixed_orbit import EARTH_RATE, EarthFixedOrbit
 from navfilters.space.frames import enu_covariance
 from navfilters.space.gravity import EARTH, Gravity
 from navfilters.space.image_measurement import SarGeometry

@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from navfilters.space.navigation_state import NavigationState
 from navfilters.papers.pogorelsky2020.acquisition import measure_directly
 from navfilters.papers.pogorelsky2020.imaging import FULL, Imaging
 from navfilters.papers.pogorelsky2020.real_patches import Patch
 from navfilters.sar.images.autofocusing import Climb
 from navfilters.sar.matching.geolocation import Match
 from navfilters.space.image_measurement import Measurement
+from navfilters.space.navigation_state import NavigationState
 from navfilters.types import Array
 
 
