@@ -34,7 +34,7 @@ from navfilters.estimators.update import (
 )
 from navfilters.estimators.variants import Variant, unchanged
 from navfilters.numerics import validation
-from navfilters.types import Array, Dynamics, Gaussian, MeasurementModel, Moments
+from navfilters.types import Array, Gaussian, MeasurementModel, Moments
 
 PREDICTIONS = {second_order: predict_second_order, unscented: predict_unscented}
 """How the moments functions predict a state; all others linearise."""
@@ -162,7 +162,7 @@ class Filter:
         """
         return first_state(prior, self.rule)
 
-    def predict(self, state: FilterState, dynamics: Dynamics, k: Array = 0) -> FilterState:
+    def predict(self, state: FilterState, dynamics: Any, k: Array = 0) -> FilterState:
         """The state one transition later.
 
         Parameters
@@ -188,9 +188,7 @@ class Filter:
             estimate=predict(state.estimate, dynamics, Q, **options), memory=memory
         )
 
-    def update(
-        self, state: FilterState, z: Array, sensor: MeasurementModel, k: Array = 0
-    ) -> FilterState:
+    def update(self, state: FilterState, z: Array, sensor: Any, k: Array = 0) -> FilterState:
         """The state after a measurement.
 
         Parameters
@@ -222,7 +220,7 @@ class Filter:
         return FilterState(estimate, missed(state, gone), memory, y, moments.P_zz)
 
     def _ruled(
-        self, state: FilterState, z: Array, sensor: MeasurementModel, gone: Array | None
+        self, state: FilterState, z: Array, sensor: Any, gone: Array | None
     ) -> tuple[Gaussian, Any, Moments | None]:
         """Prior and memory by the rule, which does not act where not all was measured."""
         assert self.rule is not None
@@ -240,8 +238,8 @@ class Filter:
         self,
         state: FilterState,
         z: Array,
-        sensor: MeasurementModel,
-        dynamics: Dynamics | None = None,
+        sensor: Any,
+        dynamics: Any = None,
         k: Array = 0,
     ) -> FilterState:
         """A prediction, where there are dynamics, and an update.
@@ -306,7 +304,7 @@ def first_state(prior: Gaussian, rule: Rule | None = None) -> FilterState:
     return FilterState(prior, zeros(prior), None if rule is None else rule.init(prior))
 
 
-def seen(z: Array, sensor: MeasurementModel, k: Array) -> tuple[Array, MeasurementModel]:
+def seen(z: Array, sensor: Any, k: Array) -> tuple[Array, MeasurementModel]:
     """What is compared with the sensor of step k, and that sensor."""
     sensor = model_parts.at(sensor, k)
     return sensor.given(z) if hasattr(sensor, "given") else (z, sensor)

@@ -19,7 +19,8 @@ from navfilters.space.pose import difference, retract
 from navfilters.types import Array, Gaussian
 
 
-class FixedModel(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class FixedModel:
     """A sensor of which H and R are given, and whose measurement is the residual.
 
     Parameters
