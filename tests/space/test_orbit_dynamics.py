@@ -83,11 +83,8 @@ def test_jax_takes_a_batch_of_noise():
 
 
 def test_what_jax_compiles_does_not_grow_with_the_sub_steps():
-    sizes = [
-        len(str(jax.make_jaxpr(Orbit(thrust=BURN, substeps=n).transition)(states())))
-        for n in (10, 100)
-    ]
-    assert sizes[1] < sizes[0] + 10
+    long = Orbit(thrust=BURN, substeps=1000)
+    assert len(jax.make_jaxpr(long.transition)(states()).eqns) < 100
 
 
 def test_a_later_interval_burns_at_its_own_time():
