@@ -157,13 +157,8 @@ class Orbit:
         -------
         array (..., 6)
         """
-        pushes = self._pushes(self.start, self.substeps, x)
-        return repeat(
-            lambda k, x: self._advance(x, _at(pushes, k)),
-            x,
-            self.substeps,
-            x.__array_namespace__(),
-        )
+        advance = partial(self._advance, self._pushes(self.start, self.substeps, x))
+        return repeat(advance, x, self.substeps, x.__array_namespace__())
 
     def transition(self, x: Array) -> tuple[Array, Array]:
         """The state at the interval's end, and its derivative with respect to x.
@@ -276,8 +271,9 @@ class Orbit:
         middles = (np.arange(count) + 0.5).reshape(-1, *(1,) * np.ndim(t))
         return self.thrust.strengths(t + self.step * middles, x)
 
-    def _advance(self, x: Array, thrust: Array | None) -> Array:
-        """The state a sub-step later."""
+    def _advance(self, pushes: Array | None, k: Array, x: Array) -> Array:
+        """The state after sub-step k."""
+        thrust = None if pushes is None else pushes[k]
         if isinstance(thrust, np.ndarray | np.generic) and not thrust.any():
             thrust = None  # saves its term
         derivative = partial(self.derivative, thrust=thrust)
@@ -287,7 +283,7 @@ class Orbit:
         pushes = self._pushes(t, self.substeps, x)
         states = [x]
         for k in range(self.substeps):
-            states.append(self._advance(states[-1], _at(pushes, k)))
+            states.append(self._advance(pushes, k, states[-1]))
         return x.__array_namespace__().stack(states)
 
     def _to_end(self, states: Array, t: float) -> Iterator[Array]:
@@ -298,11 +294,10 @@ class Orbit:
         pushes = self._pushes(self.start, self.substeps, x)
 
         def sub_step(k: Array, x: Array) -> tuple[Array, Callable]:
-            thrust, at, order = _at(pushes, k), x, 1
-            x_next = self._advance(x, thrust)
+            x_next, at, order = self._advance(pushes, k, x), x, 1
             if self.integrator == "rk4":
                 at, order = middle(x, x_next, self.step), 3
-            V = None if thrust is None else along_velocity(at[..., 3:], thrust)
+            V = None if pushes is None else along_velocity(at[..., 3:], pushes[k])
             A = partial(rates, self.gravity.gradient(at[..., :3]), V)
             return x_next, partial(series, A, self.step, order)
 
@@ -310,10 +305,6 @@ class Orbit:
 
 
 POSITION, VELOCITY = np.eye(6)[:3], np.eye(6)[3:]  # r = POSITION @ x; constants, not concat: faster
-
-
-def _at(series: Array | None, k: Array) -> Array | None:
-    return None if series is None else series[k]
 
 
 def _euler(derivative, x: Array, h: float) -> Array:
