@@ -149,7 +149,7 @@ def probe_models(job: Job, problem: Problem) -> None:
     for size in (1, SEVERAL):
         march = March(job, problem.chunk(0, size).arrays)
         try:
-            model_checks.models(march.model, march.dynamics, march.prior, "priors")
+            model_checks.models(march.model, march.dynamics, march.prior, job.steps, "priors")
         except ValueError as error:
             models = ("model", "dynamics")
             if not any(leaf.core and leaf.name.startswith(models) for leaf in problem.leaves):
