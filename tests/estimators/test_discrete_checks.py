@@ -29,7 +29,7 @@ BAD = [
     ({"u": np.ones((STEPS + 1, 2))}, ValueError, "u must have one input per step, 30; found 31"),
     ({"u": np.ones(STEPS)}, ValueError, r"u must have shape \(K, \.\.\., m\); found \(30,\)"),
     ({"u": np.ones((STEPS, 3))}, ValueError, "system.f must return"),
-    ({"u": None}, ValueError, r"system.f must return .* shapes \(3,\), \(0,\)"),
+    ({"u": None}, ValueError, r"system.f must return .* shapes (\(3,\)|\(1, 3\)), \(0,\)"),
     ({"u": [["a"]]}, ValueError, "u must be an array .* of finite real numbers"),
     ({"system": replace(LINEAR, Q=np.eye(3))}, ValueError, "system.f must return"),
     ({"system": replace(LINEAR, R=np.eye(2))}, ValueError, "system.h must return"),
@@ -163,7 +163,10 @@ def test_the_steps_do_not_look_again():
 COLUMN = np.ones((3, 1))
 WRONG = {
     "the system as the model": ({"model": SCALAR}, "model must be .*model=system.sensor"),
-    "the system as the dynamics": ({"dynamics": SCALAR}, r"dynamics must be .*system.dynamics\(u\)"),
+    "the system as the dynamics": (
+        {"dynamics": SCALAR},
+        r"dynamics must be .*system.dynamics\(u\)",
+    ),
     "a continuous system": (
         {"model": ContinuousSystem(lambda x, u, w, t: w, lambda x, v, t: x + v, [[1]], [[1]])},
         "model must be a model in discrete time; found a ContinuousSystem: extended_kalman_bucy",
