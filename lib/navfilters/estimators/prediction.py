@@ -1,6 +1,6 @@
 """How a filter predicts its state: the approximation of its moments, with f in the place of h."""
 
-from navfilters.estimators.model_parts import difference, moved, retract, transition
+from navfilters.estimators.model_parts import by_error, difference, moved, retract, transition
 from navfilters.estimators.sigma_points import SigmaPoints, behind, offsets, root_of
 from navfilters.numerics.small_matrices import outer_sum
 from navfilters.numerics.state_derivatives import first_derivative, second_derivative
@@ -63,8 +63,10 @@ def transition_hessian(dynamics: Dynamics, x: Array) -> Array:
     if hasattr(dynamics, "hessian"):
         return dynamics.hessian(x)
     if hasattr(dynamics, "transition"):
-        return first_derivative(lambda y: dynamics.transition(y)[1], x, "F of dynamics.transition")
-    return second_derivative(lambda y: moved(dynamics, y), x, "dynamics.f")
+        F = by_error(dynamics, lambda y: dynamics.transition(y)[1], x)
+        return first_derivative(*F, "F of dynamics")
+    f = by_error(dynamics, lambda y: moved(dynamics, y), x)
+    return second_derivative(*f, "dynamics.f")
 
 
 def predict_unscented(

@@ -111,8 +111,8 @@ def measurements(
         raise ValueError(f"model must have R, and h with its derivatives; found {found}")
     R = validation.covariance("model.R", model.R, definite=False)
     shapes["model.R"] = R.shape[:-2]
-    if not hasattr(model, "given"):
-        first = at(model, 0)
+    first = at(model, 0)
+    if not hasattr(first, "given"):
         if hasattr(first, "check"):
             first.check(Gaussian(_first(prior.mean), _first(prior.cov, 2)), steps)
         _fits(z, prior, first, axes, name)
@@ -149,9 +149,9 @@ def models(model: Any, motion: Any, prior: Gaussian, steps: int, name: str = "pr
         As of :func:`sensor` and :func:`dynamics`; or as a model's own ``check`` has it.
     """
     for part in (model, motion):
-        if part is None or hasattr(part, "given"):
+        first = None if part is None else at(part, 0)
+        if first is None or hasattr(first, "given"):
             continue
-        first = at(part, 0)
         if hasattr(first, "check"):
             first.check(prior, steps)
         elif part is model:
