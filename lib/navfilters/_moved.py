@@ -8,7 +8,7 @@ MOVED = {
     "bounds": "papers.xiong2009",
     "claims": "book.claims",
     "consistency": "runs.consistency",
-    "continuous": "estimators.continuous_system, estimators.continuous, estimators.integration",
+    "continuous": "estimators.continuous",
     "derivatives": "numerics.complex_step, numerics.jacobians",
     "discrete": "estimators.discrete",
     "engine": "runs.loop",

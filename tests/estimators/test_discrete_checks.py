@@ -7,8 +7,7 @@ import pytest
 from discrete_systems import LINEAR, PRIOR, STEPS, F, L, M, Q, ekf, predict, signals, update
 
 from navfilters import FILTERS, Gaussian, run, sweep
-from navfilters.estimators.continuous import extended_kalman_bucy
-from navfilters.estimators.continuous_system import ContinuousSystem
+from navfilters.estimators.continuous import ContinuousSystem, extended_kalman_bucy
 from navfilters.estimators.discrete import DiscreteSystem
 
 GOOD = dict(zip(("y", "u"), signals(), strict=True)) | {"system": LINEAR, "prior": PRIOR}

@@ -11,7 +11,7 @@ from numpy.testing import assert_array_equal
 from navfilters import FILTERS, Gaussian, SigmaPoints, first_indefinite, run, sweep
 from navfilters.estimators.adaptive import AdaptiveEKF
 from navfilters.estimators.continuous import extended_kalman_bucy
-from navfilters.estimators.continuous_system import ContinuousSystem
+from navfilters.estimators.continuous import ContinuousSystem
 from navfilters.estimators.discrete import DiscreteSystem, extended_kalman_filter, predict, update
 from navfilters.estimators.extended import ExtendedKalman
 from navfilters.estimators.moments import linearized

@@ -11,8 +11,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import solve_continuous_are, solve_discrete_are
 
 from navfilters import FILTERS, Gaussian, sweep
-from navfilters.estimators.continuous import extended_kalman_bucy, linearized_kalman_bucy
-from navfilters.estimators.continuous_system import ContinuousSystem, reference_residual
+from navfilters.estimators.continuous import (
+    ContinuousSystem,
+    extended_kalman_bucy,
+    linearized_kalman_bucy,
+    reference_residual,
+)
 from navfilters.numerics.complex_step import complex_step
 from navfilters.papers.lecture16.pendulum import Setup, band_limited_noise, discretised, sampled
 from navfilters.runs import records

@@ -11,7 +11,7 @@ from navfilters import FILTERS, Gaussian, SigmaPoints, sweep
 from navfilters.estimators.adaptive import AdaptiveEKF
 from navfilters.estimators.continuous import extended_kalman_bucy as continuous
 from navfilters.estimators.continuous import linearized_kalman_bucy
-from navfilters.estimators.continuous_system import ContinuousSystem, Reference
+from navfilters.estimators.continuous import ContinuousSystem, Reference
 from navfilters.estimators.discrete import DiscreteSystem, predict, update
 from navfilters.estimators.discrete import extended_kalman_filter as discrete
 from navfilters.estimators.extended import ExtendedKalman

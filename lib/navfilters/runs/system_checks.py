@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from navfilters.estimators.continuous_system import ContinuousSystem
+from navfilters.estimators.continuous import ContinuousSystem
 from navfilters.estimators.discrete import DiscreteSystem
 from navfilters.estimators.model_parts import at
 from navfilters.types import Gaussian

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from navfilters.estimators.continuous_system import ContinuousSystem, Reference, Signal
+from navfilters.estimators.continuous import ContinuousSystem, Reference, Signal
 from navfilters.estimators.discrete import DiscreteSystem
 from navfilters.numerics.small_matrices import matrix
 from navfilters.types import Array, Gaussian

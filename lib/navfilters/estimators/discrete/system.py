@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from navfilters.estimators.discrete_models import DiscreteDynamics, DiscreteSensor, fits, zeros
+from navfilters.estimators.discrete.models import DiscreteDynamics, DiscreteSensor, fits, zeros
 from navfilters.numerics import validation
 from navfilters.numerics.jacobians import check_model, jacobian
 from navfilters.types import Array

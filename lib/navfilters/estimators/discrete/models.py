@@ -19,7 +19,7 @@ class DiscreteDynamics:
 
     Parameters
     ----------
-    system : navfilters.estimators.discrete.DiscreteSystem
+    system : DiscreteSystem
     u : array (..., K, m), optional
         The inputs of all steps.
     k : int
@@ -27,7 +27,7 @@ class DiscreteDynamics:
 
     References
     ----------
-    lecture16, Eqs. (81)-(84), whose index k is k + 1 here; L_k in (49) is the L_{k-1} of (84).
+    lecture16, Eqs. (81)-(84), whose index k is k + 1 here.
     """
 
     system: Any
@@ -114,14 +114,13 @@ class DiscreteSensor:
 
     Parameters
     ----------
-    system : navfilters.estimators.discrete.DiscreteSystem
+    system : DiscreteSystem
     k : int
         The step of the measurement: that of a run's first step is 1.
 
     References
     ----------
-    lecture16, Eqs. (85)-(88). (66) carries a noise term that its own expectation removes; (68) and
-    (87) have the estimate x_hat where they print x.
+    lecture16, Eqs. (85)-(88).
     """
 
     system: Any
