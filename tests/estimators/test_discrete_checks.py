@@ -20,6 +20,7 @@ BAD = [
         ValueError,
         "bro",
     ),
+    ({"y": 1.0}, ValueError, r"z must have shape \(steps, \.\.\., m\); found \(\)"),
     ({"y": np.ones(STEPS)}, ValueError, r"z must have shape .* with 30 steps; found \(30,\)"),
     ({"y": np.ones((0, 2))}, ValueError, "u must have one input per step, 0; found 30"),
     ({"y": np.ones((STEPS, 3))}, ValueError, r"z must .* with m = 2 .*; found \(30, 3\)"),

@@ -16,7 +16,12 @@ def number_of_steps(steps: int | None, z: Any, z_per_step: bool) -> int:
     """The number of steps that was given, or the length of z, or 1000."""
     if steps is not None:
         return validation.whole_number("steps", steps, 0)
-    return len(z) if z_per_step and not callable(z) else 1000
+    if callable(z) or not z_per_step:
+        return 1000
+    shape = np.shape(validation.plain("z", z))
+    if not shape:
+        raise ValueError("z must have shape (steps, ..., m); found ()")
+    return shape[0]
 
 
 def start(name: str, prior: Any, model: Any, dynamics: Any) -> Gaussian:

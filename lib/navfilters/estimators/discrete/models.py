@@ -137,7 +137,11 @@ class DiscreteSensor:
 
     def h(self, x: Array) -> Array:
         """h(x, 0, k), (..., p)."""
-        return validation.given("system.h", self.system.h(x, zeros(x, self.R), self.k))
+        value = validation.given("system.h", self.system.h(x, zeros(x, self.R), self.k))
+        if value.ndim < x.ndim:
+            lead = ", ".join(map(str, x.shape[:-1]))
+            raise ValueError(f"system.h must have shape ({lead}, p); found {value.shape}")
+        return value
 
     def jacobian(self, x: Array) -> Array:
         """H, (..., p, n)."""
