@@ -1,7 +1,7 @@
 """The two models that a discrete-time system is to a filter: its motion and its measurement."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,7 @@ class DiscreteDynamics:
 
     def at(self, k: int) -> "DiscreteDynamics":
         """The motion from step k, counted from 0, to the next."""
-        return replace(self, k=k)
+        return DiscreteDynamics(self.system, self.u, k)
 
     @property
     def Q(self) -> Array:
@@ -48,14 +48,17 @@ class DiscreteDynamics:
 
     def f(self, x: Array) -> Array:
         """f(x, u_k, 0, k), (..., n)."""
-        x, u = self._with_input(x)
+        return self._moved(*self._with_input(x))
+
+    def _moved(self, x: Array, u: Array) -> Array:
         moved = self.system.f(x, u, zeros(x, self.system.Q), self.k)
         return fits("system.f", moved, x.shape[-1:])
 
     def propagate(self, x: Array, Q: Array) -> tuple[Array, Array, Array]:
         """f(x, u_k, 0, k), F and L Q L^T."""
-        F, L = self.system.motion_jacobians(*self._with_input(x), self.k)
-        return self.f(x), F, L @ Q @ L.mT
+        x, u = self._with_input(x)
+        F, L = self.system.motion_jacobians(x, u, self.k)
+        return self._moved(x, u), F, L @ Q @ L.mT
 
     def hessian(self, x: Array) -> Array:
         """Second derivatives of f in x, (..., n, n, n)."""
@@ -128,7 +131,7 @@ class DiscreteSensor:
 
     def at(self, k: int) -> "DiscreteSensor":
         """The measurement after the motion from step k, counted from 0."""
-        return replace(self, k=k + 1)
+        return DiscreteSensor(self.system, k + 1)
 
     @property
     def R(self) -> Array:
