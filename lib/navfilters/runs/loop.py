@@ -10,7 +10,7 @@ from navfilters.numerics import validation
 from navfilters.numerics.allocator import keep_freed_memory
 from navfilters.numerics.small_matrices import is_positive_definite
 from navfilters.runs import model_checks, records
-from navfilters.runs.system_checks import derivatives
+from navfilters.runs.system_checks import compare_derivatives, derivatives
 from navfilters.types import Array, Gaussian
 
 
@@ -88,6 +88,7 @@ def run(
             f"found {type(estimator).__name__}"
         )
     model_checks.models(model, dynamics, prior, steps)
+    compare_derivatives(estimator, model, dynamics, prior)
     if record is not records.estimate and not callable(record):
         raise TypeError(f"record must be callable as record(state); found {record!r}")
     keep_freed_memory()

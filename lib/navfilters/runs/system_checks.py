@@ -1,10 +1,14 @@
-"""Systems are no models of a filter; the models that they offer check themselves."""
+"""Systems are no models of a filter; and derivatives that are made, compared with differences."""
 
 from typing import Any
 
+import numpy as np
+
 from navfilters.estimators.continuous import ContinuousSystem
 from navfilters.estimators.discrete import DiscreteSystem
-from navfilters.estimators.model_parts import at
+from navfilters.estimators.model_parts import at, by_error
+from navfilters.estimators.moments import unscented
+from navfilters.numerics.jacobians import ByComplexStep, around, examine
 from navfilters.types import Gaussian
 
 
@@ -42,3 +46,35 @@ def derivatives(model: Any, motion: Any, estimate: Gaussian, steps: int) -> None
     for part in (model, motion):
         if steps and hasattr(part, "examine"):
             at(part, steps - 1).examine([estimate.mean])
+
+
+def compare_derivatives(estimator: Any, model: Any, motion: Any, prior: Gaussian) -> None:
+    """Compare with differences, once, the Jacobians that a filter takes by complex step.
+
+    Parameters
+    ----------
+    estimator : object
+        Nothing is compared unless it has moments that need a Jacobian.
+    model : MeasurementModel
+    motion : Dynamics or None
+    prior : Gaussian
+        Where, and a deviation more and less.
+
+    Raises
+    ------
+    TypeError
+        As of :func:`~navfilters.numerics.complex_step.complex_step`; names model.h or dynamics.f.
+    """
+    moments = getattr(estimator, "moments", unscented)
+    if getattr(moments, "func", moments) is unscented:
+        return
+    parts = [(at(model, 0), "h", "model.h", ("jacobian", "given"))]
+    if motion is not None:
+        parts.append((at(motion, 0), "f", "dynamics.f", ("transition", "propagate")))
+    for part, name, called, known in parts:
+        if any(hasattr(part, other) for other in known):
+            continue
+        function, x = by_error(part, getattr(part, name), prior.mean)
+        with np.errstate(all="ignore"):
+            for state in around(Gaussian(x, prior.cov)):
+                examine(ByComplexStep(function, 0, called), [(state,)])
