@@ -24,6 +24,10 @@ def test_an_old_module_says_where_it_went(old):
         ("from navfilters.experiments import xiong2009", "navfilters.papers"),
         ("from navfilters.linalg import matmul", "navfilters.numerics.small_matrices"),
         ("import navfilters.models.orbit", "navfilters.space"),
+        (
+            "from navfilters.discrete import extended_kalman_filter",
+            "dynamics=system.dynamics(u), z_per_step=True)",
+        ),
     ],
 )
 def test_an_old_line_of_a_notebook(line, new):

@@ -8,7 +8,7 @@ MOVED = {
     "bounds": "papers.xiong2009",
     "claims": "book.claims",
     "consistency": "runs.consistency",
-    "continuous": "estimators.continuous_system, estimators.continuous, estimators.integration",
+    "continuous": "estimators.continuous",
     "derivatives": "numerics.complex_step, numerics.jacobians",
     "discrete": "estimators.discrete",
     "engine": "runs.loop",
@@ -48,6 +48,14 @@ MOVED = {
 }
 """Old module to new ones, under ``navfilters``."""
 
+GONE = {
+    "discrete": (
+        'extended_kalman_filter(system, prior, y, u) is run(FILTERS["EKF"], prior, y, '
+        "system.sensor, dynamics=system.dynamics(u), z_per_step=True)"
+    ),
+}
+"""What does the work of an old module's functions that have no successor of their own."""
+
 
 class Moved:
     """A finder that finds nothing, and says where it went."""
@@ -58,7 +66,8 @@ class Moved:
         package, _, module = name.partition(".")
         if package == "navfilters" and module in MOVED:
             new = " or ".join(f"navfilters.{place}" for place in MOVED[module].split(", "))
-            raise ImportError(f"{name} has moved: since version 0.2 it is {new}")
+            instead = f"; {GONE[module]}" if module in GONE else ""
+            raise ImportError(f"{name} has moved: since version 0.2 it is {new}{instead}")
         return None
 
 

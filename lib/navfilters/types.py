@@ -71,7 +71,9 @@ class MeasurementModel(Protocol):
       dx, truth minus estimate;
     - ``noise(x)``, where the noise depends on the state, in the place of R;
     - ``at(k)``, the model of step k, from 0, where it differs from step to step;
-    - ``given(z)``, the pair (measurement, model) where h depends on what was measured.
+    - ``given(z)``, the pair (measurement, model) where h depends on what was measured;
+    - ``check(prior, steps)``, in the place of the checks that a run makes before any step, and
+      ``examine(states)``, to look once more where it ends.
     """
 
     @property
@@ -92,7 +94,7 @@ class Dynamics(Protocol):
     """x_k = f(x_{k-1}) + w with w ~ N(0, Q).
 
     Q and one of ``transition`` and ``f`` are needed. It may also have ``hessian``, ``retract``,
-    ``difference`` and ``at`` as a :class:`MeasurementModel` does, and
+    ``difference``, ``at``, ``check`` and ``examine`` as a :class:`MeasurementModel` does, and
 
     - ``propagate(x, Q)``, the triple (f(x), F, W), where Q enters in another way than once at the
       end: W is what it amounts to, (..., n, n).

@@ -9,8 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from navfilters import FILTERS, Gaussian, SigmaPoints, run, sweep
 from navfilters.estimators.adaptive import AdaptiveEKF
-from navfilters.estimators.continuous import extended_kalman_bucy
-from navfilters.estimators.continuous_system import ContinuousSystem
+from navfilters.estimators.continuous import ContinuousSystem, extended_kalman_bucy
 from navfilters.estimators.robust import AdaptiveRobustEKF, RobustEKF
 from navfilters.models import RangeBearing
 from navfilters.numerics import validation

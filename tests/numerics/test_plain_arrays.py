@@ -6,13 +6,13 @@ from functools import partial
 
 import numpy as np
 import pytest
+from discrete_systems import ekf, predict, update
 from numpy.testing import assert_array_equal
 
 from navfilters import FILTERS, Gaussian, SigmaPoints, first_indefinite, run, sweep
 from navfilters.estimators.adaptive import AdaptiveEKF
-from navfilters.estimators.continuous import extended_kalman_bucy
-from navfilters.estimators.continuous_system import ContinuousSystem
-from navfilters.estimators.discrete import DiscreteSystem, extended_kalman_filter, predict, update
+from navfilters.estimators.continuous import ContinuousSystem, extended_kalman_bucy
+from navfilters.estimators.discrete import DiscreteSystem
 from navfilters.estimators.extended import ExtendedKalman
 from navfilters.estimators.moments import linearized
 from navfilters.estimators.robust import AdaptiveRobustEKF, RobustEKF
@@ -159,18 +159,18 @@ DOORS = {
     "robust, cov": ("prior.cov", COV, lambda a: remembering(RobustEKF(), cov=a)),
     "discrete, Q": ("Q", R, lambda a: DiscreteSystem(DISCRETE.f, DISCRETE.h, a, R)),
     "discrete, R": ("R", R, lambda a: DiscreteSystem(DISCRETE.f, DISCRETE.h, R, a)),
-    "discrete, y": ("y", [Z], lambda a: extended_kalman_filter(DISCRETE, Gaussian(MEAN, COV), a)),
+    "discrete, y": ("z", [Z], lambda a: ekf(DISCRETE, Gaussian(MEAN, COV), a)),
     "discrete, u": (
         "u",
         [Z],
-        lambda a: extended_kalman_filter(DISCRETE, Gaussian(MEAN, COV), [Z], a),
+        lambda a: ekf(DISCRETE, Gaussian(MEAN, COV), [Z], a),
     ),
     "discrete, mean": (
-        "posterior.mean",
+        "prior.mean",
         MEAN,
         lambda a: predict(DISCRETE, Gaussian(a, COV), np.zeros(0), 0),
     ),
-    "discrete, y alone": ("y", Z, lambda a: update(DISCRETE, Gaussian(MEAN, COV), a, 1)),
+    "discrete, y alone": ("z", Z, lambda a: update(DISCRETE, Gaussian(MEAN, COV), a, 1)),
     "continuous, mean": (
         "prior.mean",
         MEAN,

@@ -6,15 +6,21 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from discrete_systems import ekf, predict
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import solve_continuous_are, solve_discrete_are
 
-from navfilters import Gaussian
-from navfilters.estimators.continuous import extended_kalman_bucy, linearized_kalman_bucy
-from navfilters.estimators.continuous_system import ContinuousSystem, reference_residual
-from navfilters.estimators.discrete import extended_kalman_filter, predict
+from navfilters import FILTERS, Gaussian, sweep
+from navfilters.estimators.continuous import (
+    ContinuousSystem,
+    extended_kalman_bucy,
+    linearized_kalman_bucy,
+    reference_residual,
+)
 from navfilters.numerics.complex_step import complex_step
 from navfilters.papers.lecture16.pendulum import Setup, band_limited_noise, discretised, sampled
+from navfilters.runs import records
+from navfilters.runs.consistency import nees
 
 NEAR, FAR = Setup(duration=8.0), Setup(duration=8.0, released=1.2)
 AT = np.array([0.7, -1.3]), np.array([0.2]), np.array([0.4, -0.6]), 1.5
@@ -25,7 +31,7 @@ def discrete(setup, y, dt):
     """The DT-EKF's history on the grid of dt."""
     k = np.arange(1, round(setup.duration / dt) + 1)
     u = sampled(setup.control, (k - 1) * dt)
-    return extended_kalman_filter(discretised(setup.system, dt), setup.prior, sampled(y, k * dt), u)
+    return ekf(discretised(setup.system, dt), setup.prior, sampled(y, k * dt), u)
 
 
 @pytest.fixture(scope="module", params=[NEAR, FAR], ids=["on its plan", "off its plan"])
@@ -36,10 +42,10 @@ def results(request):
     t = np.linspace(0, setup.duration, 81)
     at = setup.prior, y, t, setup.control
     lkf = linearized_kalman_bucy(setup.system, setup.reference(), *at, rtol=1e-6, atol=1e-6)
-    ekf = extended_kalman_bucy(setup.system, *at, rtol=1e-6, atol=1e-6)
+    continuous = extended_kalman_bucy(setup.system, *at, rtol=1e-6, atol=1e-6)
     history = discrete(setup, y, 0.004)
     every = Gaussian(history.mean[::25], history.cov[::25])
-    return setup, sampled(x, t), {"CT-LKF": lkf, "CT-EKF": ekf, "DT-EKF": every}
+    return setup, sampled(x, t), {"CT-LKF": lkf, "CT-EKF": continuous, "DT-EKF": every}
 
 
 def sigmas(truth, got):
@@ -79,7 +85,7 @@ def test_two_hundred_runs_are_as_uncertain_as_the_filter_says():
     y = np.stack([sampled(y, k * dt) for _, y in runs], axis=1)[:, None]
     prior = Gaussian(setup.prior.mean - setup.guess + guesses.reshape(20, 10, 2), setup.prior.cov)
     u = sampled(setup.control, (k - 1) * dt)[:, None, None]
-    got = extended_kalman_filter(discretised(setup.system, dt), prior, y, u)
+    got = ekf(discretised(setup.system, dt), prior, y, u)
     error = got.mean[-1] - np.array([x(2.0) for x, _ in runs])
     assert got.mean.shape == (501, 20, 10, 2)
     nees = np.einsum("...i,...ij,...j", error, np.linalg.inv(got.cov[-1]), error)
@@ -127,9 +133,7 @@ def test_discretised_noise_keeps_its_effect():
     errors = []
     for dt in (2e-3, 1e-3):
         system = discretised(linear, dt)
-        got = extended_kalman_filter(
-            system, Gaussian(np.zeros(2), wanted), np.zeros((20, 1)), np.zeros((20, 1))
-        )
+        got = ekf(system, Gaussian(np.zeros(2), wanted), np.zeros((20, 1)), np.zeros((20, 1)))
         F = np.eye(2) + dt * A
         steady = solve_discrete_are(F.T, C.T, dt * Q, R / dt)
         last = Gaussian(
@@ -211,3 +215,42 @@ def test_a_setup_is_frozen():
         FAR.released = 0.1
     assert_array_equal(FAR.prior.mean, [1.3, -0.1])
     assert_allclose(FAR.prior.cov, 0.01 * np.eye(2), rtol=1e-12)
+
+
+@pytest.mark.parametrize("engine", ["numpy", "jax"])
+def test_a_sweep_of_pendulums(engine):
+    """The whole histories of members with records of their own, on both engines."""
+    setup, dt, k = FAR, 0.01, np.arange(1, 101)
+    system, u = discretised(setup.system, dt), sampled(setup.control, (k - 1) * dt)
+    y = np.stack([sampled(setup.experiment(seed)[1], k * dt) for seed in (1, 2)], axis=1)
+    wanted = ekf(system, setup.prior, y, u)
+    got = sweep(
+        FILTERS["EKF"],
+        setup.prior,
+        y,
+        system.sensor,
+        dynamics=system.dynamics(u),
+        z_per_step=True,
+        record=records.estimate,
+        engine=engine,
+        progress=False,
+    ).record
+    assert_allclose(got.mean, wanted.mean, rtol=1e-10, atol=1e-12)
+    assert_allclose(got.cov, wanted.cov, rtol=1e-10, atol=1e-14)
+
+
+def test_consistency_takes_what_both_kinds_of_filter_return():
+    """The times in front, of a history as of a trajectory; one tends to the other with the step."""
+    setup = replace(NEAR, duration=2.0)
+    x, y = NEAR.experiment(seed=1)
+    t = np.linspace(0, 2, 201)
+    continuous = extended_kalman_bucy(
+        setup.system, setup.prior, y, t, setup.control, rtol=1e-6, atol=1e-6
+    )
+    histories = [discrete(setup, y, 0.01), discrete(setup, y, 0.002)]
+    every = [Gaussian(h.mean[::n], h.cov[::n]) for h, n in zip(histories, (1, 5), strict=True)]
+    wanted, coarse, fine = (
+        nees(found.mean - sampled(x, t), found.cov) for found in (continuous, *every)
+    )
+    assert wanted.shape == coarse.shape == (201,)
+    assert np.abs(fine - wanted).max() < np.abs(coarse - wanted).max() / 4

@@ -5,15 +5,19 @@ from functools import partial
 
 import numpy as np
 import pytest
+from discrete_systems import ekf as discrete
+from discrete_systems import predict, update
 from wrong_models import ALONE, PRIORS, RIGHT, WRONG, Model, Z
 
 from navfilters import FILTERS, Gaussian, SigmaPoints, sweep
 from navfilters.estimators.adaptive import AdaptiveEKF
+from navfilters.estimators.continuous import (
+    ContinuousSystem,
+    Reference,
+    linearized_kalman_bucy,
+)
 from navfilters.estimators.continuous import extended_kalman_bucy as continuous
-from navfilters.estimators.continuous import linearized_kalman_bucy
-from navfilters.estimators.continuous_system import ContinuousSystem, Reference
-from navfilters.estimators.discrete import DiscreteSystem, predict, update
-from navfilters.estimators.discrete import extended_kalman_filter as discrete
+from navfilters.estimators.discrete import DiscreteSystem
 from navfilters.estimators.extended import ExtendedKalman
 from navfilters.estimators.multiplicative import MekfState, mekf_update
 from navfilters.estimators.robust import AdaptiveRobustEKF, RobustEKF

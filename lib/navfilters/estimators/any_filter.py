@@ -1,5 +1,6 @@
 """Whatever a run is given as a filter, with init, predict, update and step."""
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -72,6 +73,15 @@ def as_filter(estimator: Any) -> Any:
     if isinstance(estimator, partial) and isinstance(estimator.func, Filter):
         return estimator.func.having(**estimator.keywords)
     if callable(estimator) and not isinstance(estimator, type):
+        try:
+            inspect.signature(estimator).bind(None, None, None)
+        except TypeError as error:
+            name = getattr(estimator, "__name__", repr(estimator))
+            raise TypeError(
+                f"estimator must be callable as estimator(prior, z, model); found {name}: {error}"
+            ) from None
+        except ValueError:  # a builtin, whose signature cannot be had
+            pass
         return Memoryless(estimator)
     raise TypeError(
         "estimator must be a filter such as FILTERS['EKF'], an object with init and step, or "

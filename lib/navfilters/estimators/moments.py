@@ -1,7 +1,7 @@
 """How a filter predicts its measurement: three approximations of the same three moments."""
 
 from navfilters.estimators.model_parts import hessian, jacobian, noise, residual, retract
-from navfilters.estimators.sigma_points import SigmaPoints, is_singular, offsets, root_of
+from navfilters.estimators.sigma_points import SigmaPoints, behind, is_singular, offsets, root_of
 from navfilters.numerics import validation
 from navfilters.numerics.small_matrices import matmul, outer_sum
 from navfilters.types import Array, Gaussian, MeasurementModel, Moments
@@ -129,7 +129,7 @@ def unscented(
     xp = X.__array_namespace__()
     R = noise(model, prior.mean)
     missing = R.ndim - X.ndim  # batch axes that only the model has go behind the points' axis
-    X = _behind(X, missing)
+    X = behind(X, missing)
     Z = validation.core("model.h", model.h(X), R.shape[-1:])
     _, _, W0_c, W_i = points.weights(prior.cov.shape[-1], xp)
     # The weights sum to one. Summing differences keeps the digits that a large negative W0 would
@@ -137,16 +137,11 @@ def unscented(
     z_hat = Z[0] + W_i[..., None] * xp.sum(residual(model, Z[1:], Z[0]), axis=0)
     dZ = residual(model, Z, z_hat)
     if hasattr(model, "retract"):
-        dX = _behind(dX, missing)
+        dX = behind(dX, missing)
     elif exact is None:
         dX = X - prior.mean
     else:  # what is known as a combination must not see the rounding of the mean
-        dX = xp.where(is_singular(exact)[..., None], _behind(dX, missing), X - prior.mean)
+        dX = xp.where(is_singular(exact)[..., None], behind(dX, missing), X - prior.mean)
     W0_c, W_i = W0_c[..., None, None], W_i[..., None, None]
     P_zz = R + W0_c * outer_sum(dZ[:1], dZ[:1]) + W_i * outer_sum(dZ[1:], dZ[1:])
     return Moments(z_hat, P_zz, W_i * outer_sum(dX[1:], dZ[1:]), exact=exact)
-
-
-def _behind(X: Array, missing: int) -> Array:
-    """Points with so many axes of length one behind that of the points."""
-    return X.__array_namespace__().reshape(X, (X.shape[0], *(1,) * missing, *X.shape[1:]))

@@ -1,9 +1,9 @@
 """How a filter predicts its state: the approximation of its moments, with f in the place of h."""
 
 from navfilters.estimators.model_parts import by_error, difference, moved, retract, transition
-from navfilters.estimators.sigma_points import SigmaPoints, offsets, root_of
+from navfilters.estimators.sigma_points import SigmaPoints, behind, offsets, root_of
 from navfilters.numerics.small_matrices import outer_sum
-from navfilters.numerics.state_derivatives import first_derivative
+from navfilters.numerics.state_derivatives import first_derivative, second_derivative
 from navfilters.types import Array, Dynamics, Gaussian
 
 
@@ -42,7 +42,7 @@ def predict_second_order(estimate: Gaussian, dynamics: Dynamics, Q: Array) -> Ga
     ----------
     estimate : Gaussian
     dynamics : Dynamics
-        Its Hessian is ``hessian(x)``, (..., n, n, n), or by complex step of F.
+        Its Hessian is ``hessian(x)``, (..., n, n, n), or made of F or f.
     Q : array (..., n, n)
 
     Returns
@@ -51,22 +51,22 @@ def predict_second_order(estimate: Gaussian, dynamics: Dynamics, Q: Array) -> Ga
     """
     first = predict_linearized(estimate, dynamics, Q)
     x = estimate.mean
-    if hasattr(dynamics, "hessian"):
-        second = dynamics.hessian(x)
-    else:
-        F = by_error(dynamics, lambda y: transition_jacobian(dynamics, y), x)
-        second = first_derivative(*F, "F of dynamics")
+    second = transition_hessian(dynamics, x)
     xp = second.__array_namespace__()
     b = xp.sum(second * estimate.cov[..., None, :, :], axis=(-2, -1)) / 2
     squares = b[..., :, None] * b[..., None, :]
     return Gaussian(retract(dynamics, first.mean, b), first.cov - squares)
 
 
-def transition_jacobian(dynamics: Dynamics, x: Array) -> Array:
-    """F at x, (..., n, n)."""
+def transition_hessian(dynamics: Dynamics, x: Array) -> Array:
+    """Second derivatives of f at x, (..., n, n, n): its own, or from F, or from f."""
+    if hasattr(dynamics, "hessian"):
+        return dynamics.hessian(x)
     if hasattr(dynamics, "transition"):
-        return dynamics.transition(x)[1]
-    return first_derivative(dynamics.f, x, "dynamics.f")
+        F = by_error(dynamics, lambda y: dynamics.transition(y)[1], x)
+        return first_derivative(*F, "F of dynamics")
+    f = by_error(dynamics, lambda y: moved(dynamics, y), x)
+    return second_derivative(*f, "dynamics.f")
 
 
 def predict_unscented(
@@ -90,7 +90,7 @@ def predict_unscented(
     """
     x, n = estimate.mean, estimate.cov.shape[-1]
     X = retract(dynamics, x, offsets(estimate, points, root_of(estimate.cov, points.root)[0]))
-    Y = moved(dynamics, X)
+    Y = moved(dynamics, behind(X, Q.ndim - X.ndim))  # batch axes that only the dynamics have
     xp = Y.__array_namespace__()
     _, _, W0_c, W_i = points.weights(n, xp)
     shift = W_i[..., None] * xp.sum(difference(dynamics, Y[1:], Y[0]), axis=0)

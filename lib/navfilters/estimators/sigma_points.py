@@ -130,3 +130,8 @@ def offsets(prior: Gaussian, points: SigmaPoints, root: Array) -> Array:
     batch = xp.broadcast_shapes(S.shape[:-2], prior.mean.shape[:-1])
     columns = xp.moveaxis(xp.broadcast_to(S, (*batch, n, n)), -1, 0)
     return xp.concat([xp.zeros_like(columns[:1]), columns, -columns], axis=0)
+
+
+def behind(X: Array, missing: int) -> Array:
+    """Points with so many axes of length one behind that of the points."""
+    return X.__array_namespace__().reshape(X, (X.shape[0], *(1,) * missing, *X.shape[1:]))

@@ -32,10 +32,11 @@ class FilterState(NamedTuple):
     S: Array | None = None
 
     @property
-    def log_likelihood(self) -> Array:
-        """Log-density of the last innovation, (...); 0 where nothing was measured."""
+    def log_likelihood(self) -> Array | None:
+        """Log-density of the last innovation, (...): 0 where nothing was measured; None before."""
         y, S = self.innovation, self.S
-        assert y is not None
+        if y is None:
+            return None
         xp = y.__array_namespace__()
         gone = xp.isnan(y) & ~xp.isnan(xp.linalg.diagonal(S))
         either = gone[..., :, None] | gone[..., None, :]

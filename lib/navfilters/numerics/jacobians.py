@@ -13,7 +13,8 @@ from navfilters.numerics.complex_step import (
     _compare_with_differences,
     _real_vector,
 )
-from navfilters.types import Gaussian
+from navfilters.numerics.state_derivatives import first_derivative
+from navfilters.types import Array, Gaussian
 
 
 @dataclass(eq=False)
@@ -21,7 +22,8 @@ class ByComplexStep:
     """The Jacobian of a function of several arguments in one of them.
 
     Called with the function's arguments it returns (..., m, n). The first call, and every
-    :meth:`examine`, compares it with differences; later calls do not.
+    :meth:`examine`, compares it with differences; later calls do not. Of a JAX array it is computed
+    in forward mode.
 
     Parameters
     ----------
@@ -38,7 +40,11 @@ class ByComplexStep:
     name: str
     examined: bool = False
 
-    def __call__(self, *arguments: Any) -> np.ndarray:
+    def __call__(self, *arguments: Any) -> Array:
+        x = arguments[self.position]
+        if hasattr(x, "__array_namespace__") and not isinstance(x, np.ndarray):
+            before, after = arguments[: self.position], arguments[self.position + 1 :]
+            return first_derivative(lambda z: self.function(*before, z, *after), x, self.name)
         if not self.examined:
             return self.examine(*arguments)
         f, x = self._of_one(arguments)

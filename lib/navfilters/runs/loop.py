@@ -10,6 +10,7 @@ from navfilters.numerics import validation
 from navfilters.numerics.allocator import keep_freed_memory
 from navfilters.numerics.small_matrices import is_positive_definite
 from navfilters.runs import model_checks, records
+from navfilters.runs.system_checks import compare_derivatives, derivatives
 from navfilters.types import Array, Gaussian
 
 
@@ -86,7 +87,8 @@ def run(
             "estimator must have predict and update where z is a function of the predicted state; "
             f"found {type(estimator).__name__}"
         )
-    model_checks.models(model, dynamics, prior)
+    model_checks.models(model, dynamics, prior, steps)
+    compare_derivatives(estimator, model, dynamics, prior)
     if record is not records.estimate and not callable(record):
         raise TypeError(f"record must be callable as record(state); found {record!r}")
     keep_freed_memory()
@@ -101,6 +103,7 @@ def run(
             else:
                 state = estimator.step(state, z[k] if z_per_step else z, model, dynamics, k)
             rows.append(record(state))
+        derivatives(model, dynamics, state.estimate, steps)
     kept = records.stacked(rows)
     if record is records.estimate:
         batch = np.broadcast_shapes(batch, kept.mean.shape[1:-1], kept.cov.shape[1:-2])

@@ -8,6 +8,7 @@ import numpy as np
 from navfilters.estimators.model_parts import at, noise
 from navfilters.numerics import probing, validation
 from navfilters.numerics.probing import unwritable
+from navfilters.runs.system_checks import refuse_systems
 from navfilters.types import Gaussian, MeasurementModel
 
 
@@ -15,7 +16,12 @@ def number_of_steps(steps: int | None, z: Any, z_per_step: bool) -> int:
     """The number of steps that was given, or the length of z, or 1000."""
     if steps is not None:
         return validation.whole_number("steps", steps, 0)
-    return len(z) if z_per_step and not callable(z) else 1000
+    if callable(z) or not z_per_step:
+        return 1000
+    shape = np.shape(validation.plain("z", z))
+    if not shape:
+        raise ValueError("z must have shape (steps, ..., m); found ()")
+    return shape[0]
 
 
 def start(name: str, prior: Any, model: Any, dynamics: Any) -> Gaussian:
@@ -37,7 +43,10 @@ def start(name: str, prior: Any, model: Any, dynamics: Any) -> Gaussian:
     ------
     ValueError
         A wrong shape, a value that is not finite, a covariance that is not one.
+    TypeError
+        A system in the place of a model.
     """
+    refuse_systems(model, dynamics)
     curved = next((m for m in (model, dynamics) if hasattr(m, "retract")), None)
     if curved is None:
         return validation.gaussian(name, prior)
@@ -109,6 +118,8 @@ def measurements(
     shapes["model.R"] = R.shape[:-2]
     first = at(model, 0)
     if not hasattr(first, "given"):
+        if hasattr(first, "check"):
+            first.check(Gaussian(_first(prior.mean), _first(prior.cov, 2)), steps)
         _fits(z, prior, first, axes, name)
     return z, validation.batch(**shapes)
 
@@ -125,7 +136,7 @@ def _fits(z, prior: Gaussian, model: MeasurementModel, axes: str, name: str) -> 
         )
 
 
-def models(model: Any, motion: Any, prior: Gaussian, name: str = "prior") -> None:
+def models(model: Any, motion: Any, prior: Gaussian, steps: int, name: str = "prior") -> None:
     """Check the models of measurement and motion, as they are at the first step.
 
     Parameters
@@ -133,19 +144,25 @@ def models(model: Any, motion: Any, prior: Gaussian, name: str = "prior") -> Non
     model : MeasurementModel
     motion : Dynamics or None
     prior : Gaussian
+    steps : int
     name : str
         The prior's, as the caller knows it.
 
     Raises
     ------
     ValueError
-        As of :func:`sensor` and :func:`dynamics`.
+        As of :func:`sensor` and :func:`dynamics`; or as a model's own ``check`` has it.
     """
-    first = at(model, 0)
-    if not hasattr(first, "given"):
-        sensor(first, prior, name=name)
-    if motion is not None:
-        dynamics(at(motion, 0), prior)
+    for part in (model, motion):
+        first = None if part is None else at(part, 0)
+        if first is None or hasattr(first, "given"):
+            continue
+        if hasattr(first, "check"):
+            first.check(prior, steps)
+        elif part is model:
+            sensor(first, prior, name=name)
+        else:
+            dynamics(first, prior)
 
 
 def sensor(model: MeasurementModel, prior: Gaussian, *, name: str = "prior") -> None:
@@ -245,9 +262,9 @@ def _state_size(model: MeasurementModel, mean: np.ndarray, m: int) -> int | None
     return found[-1] if found[-2:-1] == (m,) else None
 
 
-def _first(x: np.ndarray) -> np.ndarray:
+def _first(x: np.ndarray, core: int = 1) -> np.ndarray:
     """One member; of an empty batch, ones."""
-    return x[(0,) * (x.ndim - 1)] if x.size else np.ones(x.shape[-1])
+    return x[(0,) * (x.ndim - core)] if x.size else np.ones(x.shape[-core:])
 
 
 def _alike(

@@ -9,6 +9,7 @@ import numpy as np
 from navfilters.numerics import validation
 from navfilters.runs import model_checks
 from navfilters.runs.march import Chunk, Job, March
+from navfilters.runs.system_checks import compare_derivatives
 from navfilters.runs.trees import Leaf, Tree, flatten
 from navfilters.types import Gaussian
 
@@ -149,7 +150,8 @@ def probe_models(job: Job, problem: Problem) -> None:
     for size in (1, SEVERAL):
         march = March(job, problem.chunk(0, size).arrays)
         try:
-            model_checks.models(march.model, march.dynamics, march.prior, "priors")
+            model_checks.models(march.model, march.dynamics, march.prior, job.steps, "priors")
+            compare_derivatives(march.filter, march.model, march.dynamics, march.prior)
         except ValueError as error:
             models = ("model", "dynamics")
             if not any(leaf.core and leaf.name.startswith(models) for leaf in problem.leaves):

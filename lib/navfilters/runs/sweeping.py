@@ -175,7 +175,7 @@ def _probe(job: Job, problem: Problem) -> Kept:
     """One step of the first configuration, once its model is known to be sound."""
     one = replace(job, engine="numpy", steps=min(job.steps, 1))
     with _doubles(job.engine):
-        probe_models(one, problem)
+        probe_models(job, problem)
         return compute(one, problem.chunk(0, 1))
 
 

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from navfilters.estimators.continuous_system import ContinuousSystem, Reference, Signal
+from navfilters.estimators.continuous import ContinuousSystem, Reference, Signal
 from navfilters.estimators.discrete import DiscreteSystem
+from navfilters.numerics.small_matrices import matrix
 from navfilters.types import Array, Gaussian
 
 
@@ -125,19 +126,18 @@ class Setup:
 
     def A(self, x: Array, u: Array, w: Array, t: float) -> Array:
         """df/dx, (..., 2, 2)."""
-        pull = (self.gravity + w[..., 1]) * np.cos(x[..., 0]) - w[..., 0] * np.sin(x[..., 0])
-        J = np.zeros((*pull.shape, 2, 2))
-        J[..., 0, 1] = 1
-        J[..., 1, 0] = -pull / self.length
-        J[..., 1, 1] = -self.damping
-        return J
+        xp = x.__array_namespace__()
+        angle = x[..., 0]
+        pull = (self.gravity + w[..., 1]) * xp.cos(angle) - w[..., 0] * xp.sin(angle)
+        zero = 0 * pull
+        return matrix([[zero, zero + 1], [-pull / self.length, zero - self.damping]])
 
     def L(self, x: Array, u: Array, w: Array, t: float) -> Array:
         """df/dw, (..., 2, 2): a gain that depends on the state."""
-        J = np.zeros((*x.shape[:-1], 2, 2))
-        J[..., 1, 0] = -np.cos(x[..., 0]) / self.length
-        J[..., 1, 1] = -np.sin(x[..., 0]) / self.length
-        return J
+        xp = x.__array_namespace__()
+        angle = x[..., 0]
+        zero = 0 * angle
+        return matrix([[zero, zero], [-xp.cos(angle) / self.length, -xp.sin(angle) / self.length]])
 
     def range(self, x: Array) -> Array:
         """Distance between bob and sensor, (...), m."""
@@ -153,11 +153,10 @@ class Setup:
 
     def C(self, x: Array, v: Array, t: float) -> Array:
         """dh/dx, (..., 1, 2)."""
+        xp = x.__array_namespace__()
         angle = x[..., 0]
-        turn = -self.sensor[0] * np.cos(angle) - self.sensor[1] * np.sin(angle)
-        J = np.zeros((*angle.shape, 1, 2))
-        J[..., 0, 0] = self.length * turn / self.range(x) * (1 + v[..., 0])
-        return J
+        turn = -self.sensor[0] * xp.cos(angle) - self.sensor[1] * xp.sin(angle)
+        return matrix([[self.length * turn / self.range(x) * (1 + v[..., 0]), 0 * angle]])
 
     def M(self, x: Array, v: Array, t: float) -> Array:
         """dh/dv, (..., 1, 1), m: the range itself."""

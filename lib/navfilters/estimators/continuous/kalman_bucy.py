@@ -4,20 +4,16 @@ from typing import Any
 
 import numpy as np
 
-from navfilters.estimators.continuous_system import (
-    ContinuousSystem,
-    Reference,
-    Signal,
-    _check_reference,
-    _door,
-    _examine,
-    _probe,
-    _signal,
-    _signals,
-    _tolerances,
+from navfilters.estimators.continuous.checks import (
+    arguments,
+    checked_signal,
+    examine_system,
+    probe_system,
+    tolerances,
 )
-from navfilters.estimators.integration import Trajectory
-from navfilters.estimators.integration import integrate as _integrate
+from navfilters.estimators.continuous.integration import Trajectory, integrate
+from navfilters.estimators.continuous.reference import check_reference, reference_signals
+from navfilters.estimators.continuous.system import ContinuousSystem, Reference, Signal
 from navfilters.numerics import validation
 from navfilters.numerics.jacobians import around
 from navfilters.numerics.probing import probe
@@ -81,29 +77,23 @@ def linearized_kalman_bucy(
         The integrator stopped, with its time and reason; or P, as a correlation, has an eigenvalue
         below -100 max(rtol, atol), at a step or at a time that is asked for, with what to do.
 
-    Notes
-    -----
-    Slips of the text: the last P^-1 in (29) is P; (28)-(29) mean the matrices of (15), not of
-    (35). Where the reference noise is not zero, w~ and v~ in (18)-(19) have the means -w_ref and
-    -v_ref, which (28) lacks: the terms in w_ref and v_ref above.
-
     References
     ----------
     lecture16, Eqs. (5)-(30).
     """
-    t, prior, y, y0 = _door(system, prior, y, t)
-    rtol, atol = _tolerances(rtol, atol)
+    t, prior, y, y0 = arguments(system, prior, y, t)
+    rtol, atol = tolerances(rtol, atol)
     if not (np.ndim(residual_tol) == 0 and residual_tol == np.inf):
         validation.number("residual_tol", residual_tol, least=0, needed="a number of at least 0")
-    x_ref, u_ref, w_ref, v_ref = _signals(system, reference, t[0], prior.mean.size)
-    u = u_ref if u is None else _signal("u", u, t[0], u_ref(t[0]).size)
-    _probe(system, x_ref(t[0]), u(t[0]), w_ref(t[0]), v_ref(t[0]), t[0], y0.size)
+    x_ref, u_ref, w_ref, v_ref = reference_signals(system, reference, t[0], prior.mean.size)
+    u = u_ref if u is None else checked_signal("u", u, t[0], u_ref(t[0]).size)
+    probe_system(system, x_ref(t[0]), u(t[0]), w_ref(t[0]), v_ref(t[0]), t[0], y0.size)
     at = x_ref(t[0]), u_ref(t[0]), w_ref(t[0]), t[0]
     if at[1].size:
         probe("system.B", system.jacobian("B"), at, (at[0].size, at[1].size), ())
     for s in (t[0], t[t.size // 2], t[-1]):
-        _examine(system, [x_ref(s)], u_ref(s), w_ref(s), v_ref(s), s)
-    _check_reference(system, reference, t, residual_tol)
+        examine_system(system, [x_ref(s)], u_ref(s), w_ref(s), v_ref(s), s)
+    check_reference(system, reference, t, residual_tol)
     A, B, L, C, M = (system.jacobian(name) for name in "ABLCM")
 
     def model(s, x):
@@ -116,7 +106,7 @@ def linearized_kalman_bucy(
         return drift, innovation, A_s, L_s, C_s, M_s
 
     start = Gaussian(prior.mean - x_ref(t[0]), prior.cov)
-    return _integrate(system, model, start, t, rtol, atol, method, x_ref)
+    return integrate(system, model, start, t, rtol, atol, method, x_ref)
 
 
 def extended_kalman_bucy(
@@ -160,20 +150,19 @@ def extended_kalman_bucy(
 
     Notes
     -----
-    Slips of the text: the last P^-1 in (37) is P, and v_0 in (36) is v_ref. Both reference noises
-    are zero here, the mean of the noise: to first order, the correction that (34) needs for any
-    other w_ref leads back to it.
+    Both reference noises are zero, the mean of the noise: to first order, the correction that (34)
+    needs for any other w_ref leads back to it.
 
     References
     ----------
     lecture16, Eqs. (31)-(37).
     """
-    t, prior, y, y0 = _door(system, prior, y, t)
-    rtol, atol = _tolerances(rtol, atol)
-    u = _signal("u", u, t[0], None)
+    t, prior, y, y0 = arguments(system, prior, y, t)
+    rtol, atol = tolerances(rtol, atol)
+    u = checked_signal("u", u, t[0], None)
     no_w, no_v = np.zeros(len(system.Q)), np.zeros(len(system.R))
-    _probe(system, prior.mean, u(t[0]), no_w, no_v, t[0], y0.size)
-    _examine(system, around(prior), u(t[0]), no_w, no_v, t[0])
+    probe_system(system, prior.mean, u(t[0]), no_w, no_v, t[0], y0.size)
+    examine_system(system, around(prior), u(t[0]), no_w, no_v, t[0])
     A, L, C, M = (system.jacobian(name) for name in "ALCM")
 
     def model(s, x):
@@ -181,6 +170,6 @@ def extended_kalman_bucy(
         innovation = y(s) - system.h(*sensing)
         return system.f(*at), innovation, A(*at), L(*at), C(*sensing), M(*sensing)
 
-    trajectory = _integrate(system, model, prior, t, rtol, atol, method, None)
-    _examine(system, [trajectory.mean[-1]], u(t[-1]), no_w, no_v, t[-1])
+    trajectory = integrate(system, model, prior, t, rtol, atol, method, None)
+    examine_system(system, [trajectory.mean[-1]], u(t[-1]), no_w, no_v, t[-1])
     return trajectory
