@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 from wrong_models import ALONE, PRIORS, RIGHT, WRONG, Model, Z
 
-from navfilters import FILTERS, Gaussian, SigmaPoints, sweep
-from navfilters.estimators.adaptive import AdaptiveEKF
+from navfilters import FILTERS, Filter, Gaussian, SigmaPoints, run, sweep
+from navfilters.estimators.adaptive import AdaptiveNoise
 from navfilters.estimators.continuous import extended_kalman_bucy as continuous
 from navfilters.estimators.continuous import linearized_kalman_bucy
 from navfilters.estimators.continuous_system import ContinuousSystem, Reference
 from navfilters.estimators.discrete import DiscreteSystem, predict, update
 from navfilters.estimators.discrete import extended_kalman_filter as discrete
-from navfilters.estimators.extended import ExtendedKalman
 from navfilters.estimators.multiplicative import MekfState, mekf_update
-from navfilters.estimators.robust import AdaptiveRobustEKF, RobustEKF
+from navfilters.estimators.robust import AdaptiveRobust, Robust
 from navfilters.space.quaternions import normalized
 
 PRIORS3 = Gaussian(PRIORS.mean, np.stack([PRIORS.cov] * 3))
@@ -92,8 +91,8 @@ class Tripled(Moving):
 
 
 class Gathering(Moving):
-    def accumulate(self, Q, x):
-        return np.array([0.1, 0.2])
+    def propagate(self, x, Q):
+        return x, np.eye(2), np.array([0.1, 0.2])
 
 
 GOOD_Q = 0.1 * np.eye(2)
@@ -106,24 +105,26 @@ MOTION = {
     "F: a row": (Moving(GOOD_Q, F=lambda x: np.ones((1, 2))), "F of .*transition must"),
     "F: a number": (Moving(GOOD_Q, F=lambda x: np.float64(1.0)), "F of .*transition must"),
     "F: a vector": (Moving(GOOD_Q, F=lambda x: np.ones(2)), "F of .*transition must"),
-    "accumulate": (Gathering(GOOD_Q), "(accumulate|dynamics.Q) must"),
+    "propagate": (Gathering(GOOD_Q), "(W of dynamics.propagate|dynamics.Q) must"),
 }
-REMEMBERING = [
-    ExtendedKalman(),
-    RobustEKF(),
-    AdaptiveEKF(directions=np.eye(2)),
-    AdaptiveRobustEKF(),
-]
+REMEMBERING = {
+    "no rule": Filter(),
+    "second order": FILTERS["mtSOF"],
+    "robust": Filter(rule=Robust()),
+    "adaptive": Filter(rule=AdaptiveNoise(directions=np.eye(2))),
+    "adaptive robust": Filter(rule=AdaptiveRobust()),
+}
 
 
-@pytest.mark.parametrize("filter_", REMEMBERING, ids=lambda f: type(f).__name__)
+@pytest.mark.parametrize("filter_", REMEMBERING.values(), ids=REMEMBERING)
 @pytest.mark.parametrize("wrong", MOTION)
 def test_a_motion_model_is_looked_at(wrong, filter_):
     model, message = MOTION[wrong]
     with pytest.raises(ValueError, match=message):
-        filter_.step(filter_.init(PRIORS), Z, model, RIGHT)
-    with pytest.raises(ValueError, match=rf"model\[0\].*{message}|{message}"):
-        sweep(filter_, PRIORS, Z, (model, RIGHT), 2, progress=False)
+        filter_.step(filter_.init(PRIORS), Z, RIGHT, model)
+    for go in (run, partial(sweep, progress=False)):
+        with pytest.raises(ValueError, match=message):
+            go(filter_, PRIORS, Z, RIGHT, 2, dynamics=model)
 
 
 def test_a_motion_model_that_mixes_the_batch_is_refused_by_sweep():
@@ -134,14 +135,15 @@ def test_a_motion_model_that_mixes_the_batch_is_refused_by_sweep():
         Moving(-GOOD_Q),
         Tripled(GOOD_Q),
     ):
-        with pytest.raises(ValueError, match=r"model\[0\]"):
-            sweep(ExtendedKalman(), PRIORS, Z, (model, RIGHT), 2, progress=False)
+        for go in (run, partial(sweep, progress=False)):
+            with pytest.raises(ValueError, match=r"dynamics\..* must"):
+                go(Filter(), PRIORS, Z, RIGHT, 2, dynamics=model)
 
 
 def test_priors_of_filters_with_a_memory_fit():
     for prior in (Gaussian(PRIORS.mean, np.eye(3)), Gaussian(np.float64(1.0), np.eye(1))):
         with pytest.raises(ValueError, match=r"prior.* must have shape"):
-            RobustEKF().init(prior)
+            Filter(rule=Robust()).init(prior)
 
 
 # --- discrete and continuous systems ------------------------------------------------------------

@@ -69,12 +69,13 @@ def as_filter(estimator: Any) -> Any:
     TypeError
         Anything else.
     """
-    if hasattr(estimator, "init") and hasattr(estimator, "step"):
-        return estimator
-    if isinstance(estimator, partial) and isinstance(estimator.func, Filter):
-        return estimator.func.having(**estimator.keywords)
-    if callable(estimator) and not isinstance(estimator, type):
-        return Memoryless(estimator)
+    if not isinstance(estimator, type):
+        if hasattr(estimator, "init") and hasattr(estimator, "step"):
+            return estimator
+        if isinstance(estimator, partial) and isinstance(estimator.func, Filter):
+            return estimator.func.having(**estimator.keywords)
+        if callable(estimator):
+            return Memoryless(estimator)
     raise TypeError(
         "estimator must be a filter such as FILTERS['EKF'], an object with init and step, or "
         f"callable as estimator(prior, z, model); found {estimator!r}"

@@ -112,9 +112,8 @@ def _whole(series: np.ndarray, batch: tuple[int, ...], core: int) -> np.ndarray:
     """A series with all the batch axes."""
     missing = len(batch) + core + 1 - series.ndim
     series = series.reshape(len(series), *(1,) * missing, *series.shape[1:])
-    return np.ascontiguousarray(
-        np.broadcast_to(series, (len(series), *batch, *series.shape[series.ndim - core :]))
-    )
+    whole = (len(series), *batch, *series.shape[series.ndim - core :])
+    return series if series.shape == whole else np.broadcast_to(series, whole).copy()
 
 
 def first_indefinite(cov: Array) -> np.ndarray:
