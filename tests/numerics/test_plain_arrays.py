@@ -47,7 +47,7 @@ class Odd(np.ndarray):
 
 def masked(value):
     """The last entry is not known; 9999 stands in its place."""
-    array = np.ma.array(value, dtype=float)
+    array = np.ma.array(value, dtype=float, copy=True)
     array.mask = np.zeros(array.shape, bool)
     array[(-1,) * array.ndim] = 9999.0
     array[(-1,) * array.ndim] = np.ma.masked
@@ -136,7 +136,7 @@ DOORS = {
     "sweep, cov": ("priors.cov", COV, lambda a: swept(cov=a)),
     "sweep, z": ("z", Z, lambda a: swept(z=a)),
     "sweep, R": ("model.R", R, lambda a: swept(model=Bare(a))),
-    "sweep, truth": ("record.truth", MEAN, lambda a: swept(record=records.Distance(a))),
+    "sweep, truth": ("truth", MEAN, lambda a: swept(record=records.Distance(a))),
     "run, truth": ("truth", MEAN, lambda a: ran(record=records.Distance(a))),
     "a filter, mean": ("prior.mean", MEAN, lambda a: FILTERS["UKF"](Gaussian(a, COV), Z, MODEL)),
     "a filter, cov": ("prior.cov", COV, lambda a: FILTERS["UKF"](Gaussian(MEAN, a), Z, MODEL)),

@@ -100,8 +100,8 @@ MOTION = {
     "Q: deviations": (Moving(np.array([0.1, 0.2])), "Q must"),
     "Q: a number": (Moving(0.1), "Q must"),
     "Q: of three": (Moving(np.eye(3)), "Q must"),
-    "f: one component": (Moving(GOOD_Q, lambda x: x[..., :1]), "f.x. of .*transition must"),
-    "f: a number": (Moving(GOOD_Q, lambda x: np.float64(1.0)), "f.x. of .*transition must"),
+    "f: one component": (Moving(GOOD_Q, lambda x: x[..., :1]), "(f.x. of .*transition|dynamics.f) must"),
+    "f: a number": (Moving(GOOD_Q, lambda x: np.float64(1.0)), "(f.x. of .*transition|dynamics.f) must"),
     "F: a row": (Moving(GOOD_Q, F=lambda x: np.ones((1, 2))), "F of .*transition must"),
     "F: a number": (Moving(GOOD_Q, F=lambda x: np.float64(1.0)), "F of .*transition must"),
     "F: a vector": (Moving(GOOD_Q, F=lambda x: np.ones(2)), "F of .*transition must"),
@@ -141,9 +141,20 @@ def test_a_motion_model_that_mixes_the_batch_is_refused_by_sweep():
 
 
 def test_priors_of_filters_with_a_memory_fit():
-    for prior in (Gaussian(PRIORS.mean, np.eye(3)), Gaussian(np.float64(1.0), np.eye(1))):
+    """A manifold's error may have fewer components than its states: of init only a model knows."""
+    for prior in (
+        Gaussian(PRIORS.mean, np.ones(2)),
+        Gaussian(PRIORS.mean, np.ones((2, 3))),
+        Gaussian(np.float64(1.0), np.eye(1)),
+        Gaussian(PRIORS.mean, 1.0),
+    ):
         with pytest.raises(ValueError, match=r"prior.* must have shape"):
             Filter(rule=Robust()).init(prior)
+    for name in FILTERS:
+        with pytest.raises(ValueError, match=r"must have shape"):
+            FILTERS[name](Gaussian(PRIORS.mean, np.eye(3)), Z, RIGHT)
+        with pytest.raises(ValueError, match=r"prior.cov must have shape \(..., 2, 2\); found"):
+            run(FILTERS[name], Gaussian(PRIORS.mean, np.eye(3)), Z, RIGHT, 1)
 
 
 # --- discrete and continuous systems ------------------------------------------------------------

@@ -10,7 +10,7 @@ from moving import WITH_MEMORY, moving
 from naive import covariances, quadratic
 from numpy.testing import assert_array_equal
 
-from navfilters import FILTERS, Gaussian, SigmaPoints, first_indefinite, run, sweep
+from navfilters import FILTERS, Gaussian, SigmaPoints, SweepError, first_indefinite, run, sweep
 from navfilters.models import Linear, RangeBearing
 from navfilters.papers.perea2007.experiment import FILTERS as PAPER
 from navfilters.papers.perea2007.experiment import Setup, position_error
@@ -98,6 +98,14 @@ def test_a_truth_may_be_each_members_and_have_fewer_components():
     mean = run(EKF, priors(), z, MODEL, 4, z_per_step=True).mean
     assert_array_equal(got.record, np.abs(mean[..., 0] - truth[:, 0]))
     assert_array_equal(run(EKF, priors(), z, MODEL, z_per_step=True, record=record), got.record)
+
+
+def test_a_truth_has_no_more_components_than_the_state():
+    record = records.Distance(np.ones(3))
+    with pytest.raises(ValueError, match=r"truth must have shape .* k up to 2; found \(3,\)"):
+        run(EKF, priors(), BASE.z, MODEL, 2, record=record)
+    with pytest.raises(SweepError, match=r"truth must have shape .* k up to 2; found \(3,\)"):
+        quiet(EKF, priors(), BASE.z, MODEL, 2, record=record)
 
 
 # --- batches and chunks -------------------------------------------------------------------------

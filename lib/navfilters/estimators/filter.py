@@ -106,7 +106,8 @@ class Filter:
                 f"{type(self.rule).__name__}"
             )
         self._know(options)
-        moments = self.moments(_given(prior), model, **_accepted(self.moments, options))
+        prior = _given(prior)
+        moments = self.moments(prior, model, **_accepted(self.moments, options))
         changed, moments = self.variant(prior, model, moments, **_accepted(self.variant, options))
         return kalman_update(changed, z, moments, form=self.form, model=model)
 
@@ -298,6 +299,10 @@ def _given(prior: Gaussian) -> Gaussian:
 def first_state(prior: Gaussian, rule: Rule | None = None) -> FilterState:
     """The state before any step, of a filter with this rule."""
     prior = _given(prior)
+    n = prior.cov.shape[-1:] if prior.cov.ndim else (0,)
+    if prior.mean.ndim == 0:
+        raise ValueError("prior.mean must have shape (..., n); found ()")
+    validation.core("prior.cov", prior.cov, n + n)
     return FilterState(prior, zeros(prior), None if rule is None else rule.init(prior))
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from navfilters.numerics import validation
 from navfilters.numerics.small_matrices import is_positive_definite
 from navfilters.types import Array, Gaussian
 
@@ -27,15 +28,27 @@ class Distance:
     ----------
     truth : array (..., k)
         The true values of the first k components of the state.
+
+    Raises
+    ------
+    ValueError
+        A truth that is no array of finite numbers, or has more components than the state.
     """
 
     truth: Array = field(metadata={"axes": 1})
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "truth", validation.real_array("truth", self.truth, "k"))
 
     def __call__(self, state: Any) -> Array:
         """The distance, (...)."""
         mean = state.estimate.mean
         xp = mean.__array_namespace__()
         truth = xp.asarray(self.truth)
+        if truth.shape[-1] > mean.shape[-1]:
+            raise ValueError(
+                f"truth must have shape (..., k) with k up to {mean.shape[-1]}; found {truth.shape}"
+            )
         return xp.linalg.vector_norm(mean[..., : truth.shape[-1]] - truth, axis=-1)
 
 
