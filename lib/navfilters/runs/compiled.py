@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from navfilters.estimators.update import COMPLETE
 from navfilters.numerics.extras import missing
 from navfilters.runs.march import Job, Kept, March
 from navfilters.runs.trees import Tree
@@ -50,7 +51,7 @@ def by_jax(job: Job, arrays: list[np.ndarray]) -> Kept:
     with jax.enable_x64(True):
         with _compiling:  # two threads would both compile
             tree = job.tree if job.tree.constant else _Once(job.tree, job.sweep)
-            key = (tree, job.axes, job.steps, job.z_per_step)
+            key = (tree, job.axes, job.steps, job.z_per_step, job.complete)
             run = _program(key, tuple((a.shape, a.dtype) for a in arrays))
         return jax.tree.map(np.asarray, run(arrays))
 
@@ -78,12 +79,16 @@ class _Once:
 @lru_cache(maxsize=64)
 def _program(key: tuple, shapes: tuple) -> Any:
     """The executable of a job for arrays of these shapes."""
-    tree, axes, steps, z_per_step = key
+    tree, axes, steps, z_per_step, complete = key
     if isinstance(tree, _Once):
         tree = tree.tree
     job = Job("jax", tree, axes, (), steps, z_per_step)
     arguments = [jax.ShapeDtypeStruct(*shape) for shape in shapes]
-    return jax.jit(lambda arrays: _in_blocks(job, arrays)).lower(arguments).compile()
+    token = COMPLETE.set(complete)
+    try:
+        return jax.jit(lambda arrays: _in_blocks(job, arrays)).lower(arguments).compile()
+    finally:
+        COMPLETE.reset(token)
 
 
 def _in_blocks(job: Job, arrays: list[jax.Array]) -> Kept:
