@@ -74,7 +74,11 @@ def difference(model: Any, x: Array, y: Array) -> Array:
 
 def moved(dynamics: Dynamics, x: Array) -> Array:
     """f(x), without its Jacobian where that costs extra."""
-    return dynamics.f(x) if hasattr(dynamics, "f") else dynamics.transition(x)[0]
+    if hasattr(dynamics, "f"):
+        return dynamics.f(x)
+    if hasattr(dynamics, "transition"):
+        return dynamics.transition(x)[0]
+    return dynamics.propagate(x, dynamics.Q)[0]
 
 
 def transition(dynamics: Dynamics, estimate: Gaussian, Q: Array) -> tuple[Array, Array, Array]:

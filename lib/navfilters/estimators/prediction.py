@@ -3,7 +3,7 @@
 from navfilters.estimators.model_parts import difference, moved, retract, transition
 from navfilters.estimators.sigma_points import SigmaPoints, offsets, root_of
 from navfilters.numerics.small_matrices import outer_sum
-from navfilters.numerics.state_derivatives import first_derivative
+from navfilters.numerics.state_derivatives import first_derivative, second_derivative
 from navfilters.types import Array, Dynamics, Gaussian
 
 
@@ -42,7 +42,7 @@ def predict_second_order(estimate: Gaussian, dynamics: Dynamics, Q: Array) -> Ga
     ----------
     estimate : Gaussian
     dynamics : Dynamics
-        Its Hessian is ``hessian(x)``, (..., n, n, n), or by complex step of F.
+        Its Hessian is ``hessian(x)``, (..., n, n, n), or by complex step of F or of f.
     Q : array (..., n, n)
 
     Returns
@@ -53,19 +53,14 @@ def predict_second_order(estimate: Gaussian, dynamics: Dynamics, Q: Array) -> Ga
     x = estimate.mean
     if hasattr(dynamics, "hessian"):
         second = dynamics.hessian(x)
+    elif hasattr(dynamics, "transition"):
+        second = first_derivative(lambda y: dynamics.transition(y)[1], x, "F of dynamics")
     else:
-        second = first_derivative(lambda y: transition_jacobian(dynamics, y), x, "F of dynamics")
+        second = second_derivative(lambda y: moved(dynamics, y), x, "dynamics.f")
     xp = second.__array_namespace__()
     b = xp.sum(second * estimate.cov[..., None, :, :], axis=(-2, -1)) / 2
     squares = b[..., :, None] * b[..., None, :]
     return Gaussian(retract(dynamics, first.mean, b), first.cov - squares)
-
-
-def transition_jacobian(dynamics: Dynamics, x: Array) -> Array:
-    """F at x, (..., n, n)."""
-    if hasattr(dynamics, "transition"):
-        return dynamics.transition(x)[1]
-    return first_derivative(dynamics.f, x, "dynamics.f")
 
 
 def predict_unscented(

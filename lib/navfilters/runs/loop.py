@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from navfilters.estimators.any_filter import as_filter
+from navfilters.estimators.filter import Filter
 from navfilters.numerics import validation
 from navfilters.numerics.allocator import keep_freed_memory
 from navfilters.numerics.small_matrices import is_positive_definite
@@ -87,6 +88,8 @@ def run(
             f"found {type(estimator).__name__}"
         )
     model_checks.models(model, dynamics, prior)
+    if steps and isinstance(estimator, Filter):
+        model_checks.derivatives(estimator, prior, model, dynamics)
     if record is not records.estimate and not callable(record):
         raise TypeError(f"record must be callable as record(state); found {record!r}")
     keep_freed_memory()

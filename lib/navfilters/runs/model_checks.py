@@ -1,6 +1,7 @@
 """Whether models of measurement and motion fit a prior: once, before any update."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from navfilters.estimators.model_parts import at, noise
 from navfilters.numerics import probing, validation
 from navfilters.numerics.probing import unwritable
+from navfilters.numerics.state_derivatives import EXAMINED
 from navfilters.types import Gaussian, MeasurementModel
 
 
@@ -223,6 +225,44 @@ def dynamics(model: Any, prior: Gaussian) -> None:
             _alike(f"F of {called}", part(name, 1, count), mean, square, own, whole=False)
     if "propagate" in known:
         _alike("W of dynamics.propagate", part("propagate", 2, 3), mean, square, own, whole=False)
+
+
+def derivatives(estimator: Any, prior: Gaussian, model: Any, motion: Any) -> None:
+    """Compare what one step of a filter derives by complex step with differences.
+
+    Parameters
+    ----------
+    estimator : object
+        With ``init`` and ``step``.
+    prior : Gaussian
+    model : MeasurementModel
+    motion : Dynamics or None
+
+    Raises
+    ------
+    TypeError
+        A function that is not analytic, whose derivative the filter needs and the model lacks.
+    """
+    first = at(model, 0)
+    given = all(hasattr(first, name) for name in ("jacobian", "hessian"))
+    moved = motion is None or hasattr(at(motion, 0), "hessian")
+    if (given and moved) or hasattr(first, "given") or not prior.mean.size:
+        return
+    cov = prior.cov[(0,) * (prior.cov.ndim - 2)]
+    nothing = np.full(_size(first, prior), np.nan)
+    with np.errstate(all="ignore"), examined():
+        state = estimator.init(Gaussian(_first(prior.mean), cov))
+        estimator.step(state, nothing, model, motion, 0)
+
+
+@contextmanager
+def examined() -> Iterator[None]:
+    """Where derivatives by complex step are compared with differences."""
+    token = EXAMINED.set(True)
+    try:
+        yield
+    finally:
+        EXAMINED.reset(token)
 
 
 def _size(model: MeasurementModel, prior: Gaussian) -> int:

@@ -176,7 +176,7 @@ def sweep(
 def _probe(job: Job, problem: Problem) -> Kept:
     """One step of the first configuration, once its model is known to be sound."""
     one = replace(job, engine="numpy", steps=min(job.steps, 1))
-    with _doubles(job.engine):
+    with _doubles(job.engine), model_checks.examined():
         probe_models(one, problem)
         return compute(one, problem.chunk(0, 1))
 
