@@ -103,12 +103,14 @@ def test_nothing_measured_keeps_the_state_bit_for_bit(name, rule, engine):
     if name != "B-EKF 4":  # its P is another before it is updated
         assert_array_equal(got.record.mean[2:, 1], got.record.mean[[2] * 5, 1])
         assert_array_equal(got.record.cov[2:, 1], got.record.cov[[2] * 5, 1])
+    # Compiled, z without a NaN is another program.
+    same = partial(assert_allclose, rtol=1e-12 if engine == "jax" else 0, atol=0)
     others = [0, 2, 3]
-    assert_array_equal(got.record.mean[:, others], full.record.mean[:, others])
-    assert_array_equal(got.record.cov[:, others], full.record.cov[:, others])
+    same(got.record.mean[:, others], full.record.mean[:, others])
+    same(got.record.cov[:, others], full.record.cov[:, others])
     memory, until = got.state.memory, go(z[:2], MODEL).state.memory
     for ours, wanted in zip(memory or (), until or (), strict=True):
-        assert_array_equal(ours[1], wanted[1])
+        same(ours[1], wanted[1])
     assert got.state.log_likelihood[1] == 0
     assert (got.state.log_likelihood[others] != 0).all()
 

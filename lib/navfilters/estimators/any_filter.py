@@ -6,9 +6,9 @@ from functools import partial
 from typing import Any
 
 from navfilters.estimators import model_parts
-from navfilters.estimators.filter import Filter, first_state, keep, missed, seen
+from navfilters.estimators.filter import Filter
 from navfilters.estimators.prediction import predict_linearized
-from navfilters.estimators.state import FilterState
+from navfilters.estimators.state import FilterState, first_state, keep, missed
 from navfilters.estimators.update import absent
 from navfilters.numerics import validation
 from navfilters.types import Array, Dynamics, Gaussian, MeasurementModel
@@ -40,7 +40,7 @@ class Memoryless:
         self, state: FilterState, z: Array, sensor: MeasurementModel, k: Array = 0
     ) -> FilterState:
         """The state after a measurement; as it was where anything of z is NaN."""
-        z, sensor = seen(validation.given("z", z), sensor, k)
+        z, sensor = model_parts.seen(validation.given("z", z), sensor, k)
         gone, estimate = absent(z), self.function(state.estimate, z, sensor)
         if gone is not None:
             some = gone.__array_namespace__().any(gone, axis=-1)

@@ -10,7 +10,7 @@ from navfilters.estimators.filter import Filter
 from navfilters.numerics import validation
 from navfilters.numerics.allocator import keep_freed_memory
 from navfilters.numerics.small_matrices import is_positive_definite
-from navfilters.runs import model_checks, records
+from navfilters.runs import derivative_checks, model_checks, records
 from navfilters.types import Array, Dynamics, Gaussian, MeasurementModel
 
 
@@ -89,7 +89,7 @@ def run(
         )
     model_checks.models(model, dynamics, prior)
     if steps and isinstance(estimator, Filter):
-        model_checks.derivatives(estimator, prior, model, dynamics)
+        derivative_checks.derivatives(estimator, prior, model, dynamics)
     if record is not records.estimate and not callable(record):
         raise TypeError(f"record must be callable as record(state); found {record!r}")
     keep_freed_memory()

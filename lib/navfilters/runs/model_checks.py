@@ -1,7 +1,6 @@
 """Whether models of measurement and motion fit a prior: once, before any update."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,7 +8,6 @@ import numpy as np
 from navfilters.estimators.model_parts import at, noise
 from navfilters.numerics import probing, validation
 from navfilters.numerics.probing import unwritable
-from navfilters.numerics.state_derivatives import EXAMINED
 from navfilters.types import Gaussian, MeasurementModel
 
 
@@ -47,7 +45,8 @@ def start(name: str, prior: Any, model: Any, dynamics: Any) -> Gaussian:
     cov = validation.covariance(f"{name}.cov", prior.cov, definite=False)
     validation.batch(**{f"{name}.mean": mean.shape[:-1], f"{name}.cov": cov.shape[:-2]})
     try:
-        moved = curved.retract(mean, np.zeros((*mean.shape[:-1], cov.shape[-1])))
+        with np.errstate(all="ignore"):
+            moved = curved.retract(mean, np.zeros((*mean.shape[:-1], cov.shape[-1])))
         validation.core("model.retract", moved, mean.shape[-1:])
     except (ValueError, IndexError) as error:
         raise ValueError(
@@ -104,22 +103,28 @@ def measurements(
         f"{name}.cov": prior.cov.shape[:-2],
         "z": z.shape[1:-1] if z_per_step else z.shape[:-1],
     }
-    if not hasattr(model, "R"):
+    first = at(model, 0)
+    if not hasattr(model, "R") or not (hasattr(first, "h") or hasattr(first, "given")):
         found = type(model).__name__
         raise ValueError(f"model must have R, and h with its derivatives; found {found}")
     R = validation.covariance("model.R", model.R, definite=False)
     shapes["model.R"] = R.shape[:-2]
-    if not hasattr(model, "given"):
-        _fits(z, prior, at(model, 0), axes, name)
+    if not hasattr(first, "given"):
+        _fits(z, prior, first, axes, name)
     return z, validation.batch(**shapes)
 
 
 def _fits(z, prior: Gaussian, model: MeasurementModel, axes: str, name: str) -> None:
     """Whether a measurement, and a state, are the model's."""
-    m = _size(model, prior)
+    m = measured_size(model, prior)
     if z.shape[-1] != m:
         raise ValueError(f"z must have shape ({axes}) with m = {m} as in model.R; found {z.shape}")
-    size = _state_size(model, prior.mean, m)
+    size = _statemeasured_size(model, prior.mean, m)
+    if size not in (None, prior.cov.shape[-1]) and hasattr(model, "retract"):
+        raise ValueError(
+            f"{name}.cov must have shape (..., {size}, {size}) for this model; found "
+            f"{prior.cov.shape}"
+        )
     if size not in (None, prior.cov.shape[-1]):
         raise ValueError(
             f"{name}.mean must have shape (..., {size}) for this model; found {prior.mean.shape}"
@@ -142,8 +147,9 @@ def models(model: Any, motion: Any, prior: Gaussian, name: str = "prior") -> Non
     ValueError
         As of :func:`sensor` and :func:`dynamics`.
     """
-    if not hasattr(model, "given"):
-        sensor(at(model, 0), prior, name=name)
+    first = at(model, 0)
+    if not hasattr(first, "given"):
+        sensor(first, prior, name=name)
     if motion is not None:
         dynamics(at(motion, 0), prior)
 
@@ -164,7 +170,7 @@ def sensor(model: MeasurementModel, prior: Gaussian, *, name: str = "prior") -> 
     ValueError
         A function whose value has another shape, or changes with the other members of the batch.
     """
-    m, n, mean = _size(model, prior), prior.cov.shape[-1], prior.mean
+    m, n, mean = measured_size(model, prior), prior.cov.shape[-1], prior.mean
     own = np.shape(model.R)[:-2]
     for part, core in (("h", (m,)), ("jacobian", (m, n)), ("hessian", (m, n, n))):
         function = getattr(model, part, None)
@@ -227,63 +233,25 @@ def dynamics(model: Any, prior: Gaussian) -> None:
         _alike("W of dynamics.propagate", part("propagate", 2, 3), mean, square, own, whole=False)
 
 
-def derivatives(estimator: Any, prior: Gaussian, model: Any, motion: Any) -> None:
-    """Compare what one step of a filter derives by complex step with differences.
-
-    Parameters
-    ----------
-    estimator : object
-        With ``init`` and ``step``.
-    prior : Gaussian
-    model : MeasurementModel
-    motion : Dynamics or None
-
-    Raises
-    ------
-    TypeError
-        A function that is not analytic, whose derivative the filter needs and the model lacks.
-    """
-    first = at(model, 0)
-    given = all(hasattr(first, name) for name in ("jacobian", "hessian"))
-    moved = motion is None or hasattr(at(motion, 0), "hessian")
-    if (given and moved) or hasattr(first, "given") or not prior.mean.size:
-        return
-    cov = prior.cov[(0,) * (prior.cov.ndim - 2)]
-    nothing = np.full(_size(first, prior), np.nan)
-    with np.errstate(all="ignore"), examined():
-        state = estimator.init(Gaussian(_first(prior.mean), cov))
-        estimator.step(state, nothing, model, motion, 0)
-
-
-@contextmanager
-def examined() -> Iterator[None]:
-    """Where derivatives by complex step are compared with differences."""
-    token = EXAMINED.set(True)
-    try:
-        yield
-    finally:
-        EXAMINED.reset(token)
-
-
-def _size(model: MeasurementModel, prior: Gaussian) -> int:
+def measured_size(model: MeasurementModel, prior: Gaussian) -> int:
     """The number of components of a measurement."""
     if not hasattr(model, "noise"):
         return np.shape(model.R)[-1]
     with np.errstate(all="ignore"):
-        return np.shape(noise(model, _first(prior.mean)))[-1]
+        return np.shape(noise(model, first_member(prior.mean)))[-1]
 
 
-def _state_size(model: MeasurementModel, mean: np.ndarray, m: int) -> int | None:
+def _statemeasured_size(model: MeasurementModel, mean: np.ndarray, m: int) -> int | None:
     """The n of a jacobian (..., m, n), if it can be had: the state may be another model's."""
     try:
         with np.errstate(all="ignore"):
-            found = np.shape(model.jacobian(unwritable(_first(mean))))
+            found = np.shape(model.jacobian(unwritable(first_member(mean))))
     except Exception:  # whatever it is, the probe will find it again
         return None
     return found[-1] if found[-2:-1] == (m,) else None
 
 
-def _first(x: np.ndarray) -> np.ndarray:
+def first_member(x: np.ndarray) -> np.ndarray:
     """One member; of an empty batch, ones."""
     return x[(0,) * (x.ndim - 1)] if x.size else np.ones(x.shape[-1])
 
@@ -299,7 +267,7 @@ def _alike(
 ) -> None:
     """One state, several in front of the model's own batch axes, and, but for a Hessian, all."""
     options: dict[str, Any] = {"whole": whole, "finite": False}
-    one = _first(x)
+    one = first_member(x)
     count = 1 + sum(core) + one.size  # no other axis is as long
     near = 1 + 2.0**-10 * np.arange(count)
     several = (near[:, None] * one).reshape(count, *(1,) * len(own), -1)

@@ -19,6 +19,7 @@ from navfilters.runs import model_checks
 from navfilters.runs import workers as places
 from navfilters.runs.checkpoints import Checkpoint
 from navfilters.runs.chunks import SweepError, compute
+from navfilters.runs.derivative_checks import examined
 from navfilters.runs.march import Chunk, Job, Kept
 from navfilters.runs.problems import WORTH_A_PROCESS, Problem, probe_models
 from navfilters.runs.results import Results
@@ -176,7 +177,7 @@ def sweep(
 def _probe(job: Job, problem: Problem) -> Kept:
     """One step of the first configuration, once its model is known to be sound."""
     one = replace(job, engine="numpy", steps=min(job.steps, 1))
-    with _doubles(job.engine), model_checks.examined():
+    with _doubles(job.engine), examined():
         probe_models(one, problem)
         return compute(one, problem.chunk(0, 1))
 
