@@ -95,7 +95,7 @@ def run(
     keep_freed_memory()
     with np.errstate(all="ignore"):  # a member that fails is NaN in the result: that is its report
         state = estimator.init(prior)
-        rows = [record(state)]
+        kept = records.put(None, record(state), 0, steps + 1)
         for k in range(steps):
             if callable(z):
                 if dynamics is not None:
@@ -103,8 +103,7 @@ def run(
                 state = estimator.update(state, z(k, state), model, k)
             else:
                 state = estimator.step(state, z[k] if z_per_step else z, model, dynamics, k)
-            rows.append(record(state))
-    kept = records.stacked(rows)
+            kept = records.put(kept, record(state), k + 1, steps + 1)
     if record is records.estimate:
         batch = np.broadcast_shapes(batch, kept.mean.shape[1:-1], kept.cov.shape[1:-2])
         return Gaussian(*map(_whole, kept, (batch, batch), (1, 2)))
