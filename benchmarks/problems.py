@@ -236,7 +236,7 @@ class Multiplicative:
 
 def swept(estimator, prior, z, model, steps, engine):
     """The last state of a sweep on one core."""
-    options = {"engine": engine, "z_varies": True, "workers": 1, "progress": False}
+    options = {"engine": engine, "z_per_step": True, "workers": 1, "progress": False}
     return sweep(estimator, prior, z[:steps], model, steps, **options).final
 
 

@@ -1,5 +1,6 @@
 """The ten filters: equations, options, the linear limit, and the promises about covariances."""
 
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from operator import itemgetter
@@ -12,7 +13,16 @@ from hypothesis import strategies as st
 from naive import covariances, each, quadratic
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters import FILTERS, Gaussian, Moments, SigmaPoints, kalman_update, run
+from navfilters import (
+    FILTERS,
+    Filter,
+    Gaussian,
+    Moments,
+    SigmaPoints,
+    kalman_update,
+    linearized,
+    run,
+)
 from navfilters.estimators.filter import _keywords
 from navfilters.estimators.variants import (
     bump_circular,
@@ -180,9 +190,40 @@ def test_the_update_is_the_plain_loop():
         prior = Gaussian(rng.normal(size=n), 10 * covariances(rng, (), n))
         moments = Moments(rng.normal(size=m), covariances(rng, (), m), rng.normal(size=(n, m)))
         z = rng.normal(size=m)
-        got, wanted = kalman_update(prior, z, moments), naive.update(*prior, z, *moments)
+        got, wanted = kalman_update(prior, z, moments), naive.update(*prior, z, *moments[:3])
         assert_allclose(got.mean, wanted[0], rtol=1e-11, atol=1e-11)
         assert_allclose(got.cov, wanted[1], rtol=1e-11, atol=1e-11)
+
+
+def test_both_forms_are_one_covariance():
+    """To rounding, scaled by the condition of the innovation's covariance; the mean, bit for bit."""
+    rng = np.random.default_rng(3)
+    for n, m, vague in product([1, 2, 3, 5], [1, 2, 3, 5], [1.0, 1e6]):
+        prior = Gaussian(rng.normal(size=(4, n)), vague * covariances(rng, (4,), n))
+        model = Linear(rng.normal(size=(m, n)), covariances(rng, (), m))
+        z, moments = rng.normal(size=m), linearized(prior, model)
+        joseph, short = (
+            kalman_update(prior, z, moments, form=form) for form in ("joseph", "short")
+        )
+        assert_array_equal(joseph.mean, short.mean)
+        bound = 1e-14 * np.linalg.cond(moments.P_zz) * size(prior.cov)
+        assert (np.abs(joseph.cov - short.cov).max(axis=(-2, -1)) < bound).all()
+        assert_array_equal(joseph.cov, joseph.cov.mT)
+
+
+def test_without_an_h_both_forms_are_the_same_line():
+    prior, z, model = nonlinear()
+    for name in ("UKF", "B-UKF", "UKFz"):
+        short = replace(FILTERS[name], form="short")
+        for ours, theirs in zip(
+            FILTERS[name](prior, z, model), short(prior, z, model), strict=True
+        ):
+            assert_array_equal(ours, theirs)
+
+
+def test_an_unknown_form_is_refused():
+    with pytest.raises(ValueError, match=r"form must be one of \['joseph', 'short'\]; found 'UD'"):
+        Filter(form="UD")
 
 
 def noise_bumped(model, x, P, moments, bump=1.0):
@@ -235,11 +276,16 @@ def test_a_variant_is_its_printed_equation(variant, plain):
     prior, _, model = nonlinear()
     z_hat, P_zz, P_xz = each(naive.second_order, *prior, model)
     for bump in [{}] if "bump" not in _keywords(variant) else [{}, *bumps()]:
+        with_H = Moments(z_hat, P_zz, P_xz, model.jacobian(prior.mean), model.R)
+        _, joseph = variant(prior, model, with_H, **bump)
         same, got = variant(prior, model, Moments(z_hat, P_zz, P_xz), **bump)
+        assert got.H is got.R is None
+        assert_allclose(joseph.P_zz - joseph.R, P_zz - model.R, rtol=1e-11, atol=1e-12)
+        assert_array_equal(joseph.P_zz, got.P_zz)
         assert same is prior
         for i, (x, P) in enumerate(zip(*prior, strict=True)):
             wanted = plain(model, x, P, (z_hat[i], P_zz[i], P_xz[i]), **bump)
-            for ours, theirs in zip(got, wanted, strict=True):
+            for ours, theirs in zip(got[:3], wanted, strict=True):
                 assert_allclose(ours[i], theirs, rtol=1e-11, atol=1e-12)
 
 

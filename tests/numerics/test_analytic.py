@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from navfilters.estimators.multiplicative import MekfState
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters.estimators.multiplicative import MekfState
 from navfilters.models import Linear, RangeBearing
 from navfilters.numerics import analytic
 from navfilters.numerics.complex_step import complex_step

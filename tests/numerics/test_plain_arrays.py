@@ -9,16 +9,16 @@ import pytest
 from discrete_systems import ekf, predict, update
 from numpy.testing import assert_array_equal
 
-from navfilters import FILTERS, Gaussian, SigmaPoints, first_indefinite, run, sweep
-from navfilters.estimators.adaptive import AdaptiveEKF
+from navfilters import FILTERS, Filter, Gaussian, SigmaPoints, first_indefinite, run, sweep
+from navfilters.estimators.adaptive import AdaptiveNoise
 from navfilters.estimators.continuous import ContinuousSystem, extended_kalman_bucy
 from navfilters.estimators.discrete import DiscreteSystem
-from navfilters.estimators.extended import ExtendedKalman
 from navfilters.estimators.moments import linearized
-from navfilters.estimators.robust import AdaptiveRobustEKF, RobustEKF
+from navfilters.estimators.robust import AdaptiveRobust, Robust
 from navfilters.estimators.update import kalman_update
 from navfilters.models import Linear, RangeBearing
 from navfilters.numerics import validation
+from navfilters.runs import records
 from navfilters.runs.consistency import mean_nees, nees
 
 MEAN, COV, Z, R = np.array([28.0, 41.0]), 4 * np.eye(2), np.array([50.2, 0.92]), 0.01 * np.eye(2)
@@ -47,7 +47,7 @@ class Odd(np.ndarray):
 
 def masked(value):
     """The last entry is not known; 9999 stands in its place."""
-    array = np.ma.array(value, dtype=float)
+    array = np.ma.array(value, dtype=float, copy=True)
     array.mask = np.zeros(array.shape, bool)
     array[(-1,) * array.ndim] = 9999.0
     array[(-1,) * array.ndim] = np.ma.masked
@@ -106,7 +106,7 @@ CONTINUOUS = ContinuousSystem(
 
 def remembering(filter_, z=Z, Q=R, noise=R, mean=MEAN, cov=COV):
     state = filter_.init(Gaussian(mean, cov))
-    return filter_.step(state, z, Drift(Q), Bare(noise))
+    return filter_.step(state, z, Bare(noise), Drift(Q))
 
 
 def swept(mean=MEAN, cov=COV, z=Z, model=MODEL, **options):
@@ -124,18 +124,20 @@ def together(z):
 
 ALONE = Gaussian(MEAN, COV)
 BUMPED = FILTERS["B-EKF 1"]
+TUNED = Filter(rule=AdaptiveNoise(directions=np.eye(2)))
 DOORS = {
     "run, mean": ("prior.mean", MEAN, lambda a: ran(mean=a)),
     "run, cov": ("prior.cov", COV, lambda a: ran(cov=a)),
     "run, z": ("z", Z, lambda a: ran(z=a)),
-    "run, z of each step": ("z", [Z], lambda a: ran(z=a, z_varies=True)),
+    "run, z of each step": ("z", [Z], lambda a: ran(z=a, z_per_step=True)),
     "run, R": ("model.R", R, lambda a: ran(model=Bare(a))),
     "run, bump": ("bump", [0.5, 1.0], lambda a: ran(estimator=partial(BUMPED, bump=a))),
     "sweep, mean": ("priors.mean", MEAN, lambda a: swept(mean=a)),
     "sweep, cov": ("priors.cov", COV, lambda a: swept(cov=a)),
     "sweep, z": ("z", Z, lambda a: swept(z=a)),
     "sweep, R": ("model.R", R, lambda a: swept(model=Bare(a))),
-    "sweep, truth": ("truth", MEAN, lambda a: swept(keep=["error"], truth=a)),
+    "sweep, truth": ("truth", MEAN, lambda a: swept(record=records.Distance(a))),
+    "run, truth": ("truth", MEAN, lambda a: ran(record=records.Distance(a))),
     "a filter, mean": ("prior.mean", MEAN, lambda a: FILTERS["UKF"](Gaussian(a, COV), Z, MODEL)),
     "a filter, cov": ("prior.cov", COV, lambda a: FILTERS["UKF"](Gaussian(MEAN, a), Z, MODEL)),
     "a filter, z": ("z", Z, lambda a: FILTERS["EKF"](Gaussian(MEAN, COV), a, MODEL)),
@@ -145,18 +147,18 @@ DOORS = {
     "a model, H": ("H", COV, lambda a: Linear(a, R)),
     "alpha": ("alpha", [0.5, 1.0], SigmaPoints),
     "kappa": ("kappa", [0.5, 1.0], lambda a: SigmaPoints(kappa=a)),
-    "gamma": ("gamma", [50.0, 60.0], RobustEKF),
-    "a": ("a", [1.0, 1.5], AdaptiveEKF),
-    "directions": ("directions", COV, lambda a: AdaptiveEKF(directions=a)),
-    "rho": ("rho", [0.5, 0.9], lambda a: AdaptiveRobustEKF(rho=a)),
-    "lam": ("lam", [1.5, 2.0], lambda a: AdaptiveRobustEKF(lam=a)),
-    "robust, z": ("z", Z, lambda a: remembering(RobustEKF(), z=a)),
-    "adaptive, z": ("z", Z, lambda a: remembering(AdaptiveEKF(directions=np.eye(2)), z=a)),
-    "adaptive robust, z": ("z", Z, lambda a: remembering(AdaptiveRobustEKF(), z=a)),
-    "robust, Q": ("dynamics.Q", R, lambda a: remembering(ExtendedKalman(), Q=a)),
-    "robust, R": ("model.R", R, lambda a: remembering(ExtendedKalman(), noise=a)),
-    "robust, mean": ("prior.mean", MEAN, lambda a: remembering(RobustEKF(), mean=a)),
-    "robust, cov": ("prior.cov", COV, lambda a: remembering(RobustEKF(), cov=a)),
+    "gamma": ("gamma", [50.0, 60.0], Robust),
+    "a": ("a", [1.0, 1.5], AdaptiveNoise),
+    "directions": ("directions", COV, lambda a: AdaptiveNoise(directions=a)),
+    "rho": ("rho", [0.5, 0.9], lambda a: AdaptiveRobust(rho=a)),
+    "lam": ("lam", [1.5, 2.0], lambda a: AdaptiveRobust(lam=a)),
+    "robust, z": ("z", Z, lambda a: remembering(Filter(rule=Robust()), z=a)),
+    "adaptive, z": ("z", Z, lambda a: remembering(TUNED, z=a)),
+    "adaptive robust, z": ("z", Z, lambda a: remembering(Filter(rule=AdaptiveRobust()), z=a)),
+    "robust, Q": ("dynamics.Q", R, lambda a: remembering(FILTERS["EKF"], Q=a)),
+    "robust, R": ("model.R", R, lambda a: remembering(FILTERS["EKF"], noise=a)),
+    "robust, mean": ("prior.mean", MEAN, lambda a: remembering(Filter(rule=Robust()), mean=a)),
+    "robust, cov": ("prior.cov", COV, lambda a: remembering(Filter(rule=Robust()), cov=a)),
     "discrete, Q": ("Q", R, lambda a: DiscreteSystem(DISCRETE.f, DISCRETE.h, a, R)),
     "discrete, R": ("R", R, lambda a: DiscreteSystem(DISCRETE.f, DISCRETE.h, R, a)),
     "discrete, y": ("z", [Z], lambda a: ekf(DISCRETE, Gaussian(MEAN, COV), a)),

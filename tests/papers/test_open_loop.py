@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from navfilters.estimators.multiplicative import MekfState, mekf_update
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
-from navfilters.estimators.multiplicative import MekfState, mekf_update
 from navfilters.papers import pogorelsky2020
 from navfilters.papers.pogorelsky2020 import __main__ as command
 from navfilters.papers.pogorelsky2020.experiment import CASES, Setup

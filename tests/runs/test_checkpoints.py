@@ -4,14 +4,13 @@ from functools import partial
 
 import numpy as np
 import pytest
-from moving import moving
+from moving import WITH_MEMORY, moving
 from numpy.testing import assert_array_equal
 
 from navfilters import FILTERS, Gaussian, SigmaPoints, sweep
-from navfilters.estimators.robust import AdaptiveRobustEKF
 from navfilters.models import RangeBearing
 from navfilters.papers.perea2007.experiment import Setup
-from navfilters.runs.sweeping import KEEP
+from navfilters.runs import records
 
 BASE = Setup()
 PRIORS = Gaussian(np.random.default_rng(0).normal(BASE.x0, 10.0, (10, 2)), BASE.prior.cov)
@@ -23,7 +22,7 @@ ARGUMENTS = {
     "steps": 3,
     "chunk": 4,
     "progress": False,
-    "keep": ["final", "history", "indefinite"],
+    "record": records.estimate,
 }
 
 
@@ -32,7 +31,7 @@ def stored(folder, **changes):
 
 
 def everything(result):
-    return *result.final, *result.history, result.indefinite
+    return *result.final, *result.record
 
 
 def assert_same(got, wanted):
@@ -60,14 +59,16 @@ def test_only_missing_chunks_are_computed(tmp_path):
 
 
 def test_a_filter_with_a_memory_comes_back_whole(tmp_path):
-    prior, z, model, steps = moving()
-    options = {"keep": ["final"], "z_varies": True, "chunk": 4, "progress": False}
+    prior, z, sensor, dynamics, steps = moving()
+    options = {"dynamics": dynamics, "z_per_step": True, "chunk": 4, "progress": False}
+    go = partial(sweep, WITH_MEMORY["AREKF"], prior, z, sensor, steps, **options)
     for _ in ("computed", "loaded"):
-        got = sweep(AdaptiveRobustEKF(), prior, z, model, steps, checkpoint=tmp_path, **options)
-        wanted = sweep(AdaptiveRobustEKF(), prior, z, model, steps, **options).final
-        assert type(got.final) is type(wanted)
-        assert_array_equal(got.final.estimate.cov, wanted.estimate.cov)
-        for ours, theirs in zip(got.final[1:], wanted[1:], strict=True):
+        got, wanted = go(checkpoint=tmp_path).state, go().state
+        assert type(got) is type(wanted)
+        assert type(got.memory) is type(wanted.memory)
+        assert_array_equal(got.estimate.cov, wanted.estimate.cov)
+        assert_array_equal(got.S, wanted.S)
+        for ours, theirs in zip(got.memory, wanted.memory, strict=True):
             assert_array_equal(ours, theirs)
 
 
@@ -116,8 +117,9 @@ CHANGES = {
     "option": {"estimator": partial(FILTERS["UKF"], points=SigmaPoints(0.5))},
     "steps": {"steps": 4},
     "chunk": {"chunk": 5},
-    "keep: less": {"keep": ["final", "indefinite"]},
-    "keep: more": {"keep": KEEP, "truth": BASE.x_true},
+    "record: nothing": {"record": None},
+    "record: another": {"record": records.definite},
+    "record: of a truth": {"record": records.Distance(np.array(BASE.x_true))},
     "engine": {"engine": "jax"},
 }
 

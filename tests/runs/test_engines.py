@@ -9,11 +9,11 @@ from moving import WITH_MEMORY, moving
 from naive import covariances
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters import FILTERS, Gaussian, SigmaPoints, SweepError, sweep
-from navfilters.estimators.robust import RobustEKF
+from navfilters import FILTERS, Filter, Gaussian, SigmaPoints, SweepError, first_indefinite, sweep
+from navfilters.estimators.robust import Robust
 from navfilters.models import RangeBearing
 from navfilters.papers.perea2007.experiment import Setup
-from navfilters.runs import compiled
+from navfilters.runs import compiled, records
 
 pytestmark = pytest.mark.slow
 
@@ -75,6 +75,11 @@ def test_engines_agree_where_the_result_is_not_a_matter_of_the_last_bit(name):
     assert apart[settled].max() < 1e-6
 
 
+def everything(state):
+    distance = records.Distance(np.array(BASE.x_true))
+    return records.estimate(state), records.definite(state), distance(state)
+
+
 def test_everything_kept_agrees():
     rng = np.random.default_rng(3)
     z = BASE.z + rng.normal(size=(7, 1, 2)) * [5.0, 0.1]
@@ -87,15 +92,15 @@ def test_everything_kept_agrees():
         z,
         RangeBearing(MODEL.R * rng.uniform(10, 100, (9, 1, 1))),
         7,
-        z_varies=True,
-        truth=np.broadcast_to(BASE.x_true, (8, 2)),
-        keep=["final", "indefinite", "error", "history"],
+        z_per_step=True,
+        record=everything,
     )
     got, wanted = kept(engine="jax"), kept()
-    assert_array_equal(got.indefinite, wanted.indefinite)
-    assert_allclose(got.error, wanted.error, rtol=1e-10)
+    assert got.record[1].dtype == bool
+    assert_array_equal(got.record[1], wanted.record[1])
+    assert_allclose(got.record[2], wanted.record[2], rtol=1e-10)
     for ours, theirs in zip(
-        (*got.final, *got.history), (*wanted.final, *wanted.history), strict=True
+        (*got.final, *got.record[0]), (*wanted.final, *wanted.record[0]), strict=True
     ):
         assert isinstance(ours, np.ndarray)
         assert ours.dtype == np.float64
@@ -104,13 +109,11 @@ def test_everything_kept_agrees():
 
 @pytest.mark.parametrize("steps", [0, 1, 2])
 def test_few_steps(steps):
-    kept = partial(
-        quiet, FILTERS["EKF"], priors(3), BASE.z, MODEL, steps, keep=["final", "history"]
-    )
+    kept = partial(quiet, FILTERS["EKF"], priors(3), BASE.z, MODEL, steps, record=records.estimate)
     got, wanted = kept(engine="jax"), kept()
-    assert got.history.mean.shape == (steps + 1, 3, 2)
+    assert got.record.mean.shape == (steps + 1, 3, 2)
     for ours, theirs in zip(
-        (*got.final, *got.history), (*wanted.final, *wanted.history), strict=True
+        (*got.final, *got.record), (*wanted.final, *wanted.record), strict=True
     ):
         assert_allclose(ours, theirs, rtol=1e-10, atol=1e-10)
 
@@ -118,11 +121,9 @@ def test_few_steps(steps):
 @pytest.mark.parametrize("name", WITH_MEMORY)
 def test_filters_with_a_memory(name):
     """The AREKF's memory is None before its first step."""
-    prior, z, model, steps = moving()
-    got, wanted = (
-        quiet(WITH_MEMORY[name], prior, z, model, steps, z_varies=True, engine=engine).final
-        for engine in ("jax", "numpy")
-    )
+    prior, z, sensor, dynamics, steps = moving()
+    go = partial(quiet, WITH_MEMORY[name], prior, z, sensor, steps, dynamics=dynamics)
+    got, wanted = (go(z_per_step=True, engine=engine).state for engine in ("jax", "numpy"))
     assert type(got) is type(wanted)
     assert_close(jax.tree.leaves(got), jax.tree.leaves(wanted))
 
@@ -154,13 +155,13 @@ def test_a_member_that_fails_is_nan_alone(engine):
     mean = priors(count).mean.copy()
     mean[bad] = 0.0  # no derivative
     go = partial(quiet, FILTERS["EKF"], z=BASE.z, model=MODEL, steps=4, engine=engine)
-    got = go(priors=Gaussian(mean, priors(count).cov), keep=["final", "indefinite"])
+    got = go(priors=Gaussian(mean, priors(count).cov), record=records.definite)
     healthy = go(priors=priors(count)).final
     others = np.arange(count) != bad
     for ours, wanted in zip(got.final, healthy, strict=True):
         assert_array_equal(ours[others], wanted[others])
         assert np.isnan(ours[bad]).all()
-    assert np.flatnonzero(got.indefinite >= 0).tolist() == [bad]
+    assert np.flatnonzero(first_indefinite(got.record) >= 0).tolist() == [bad]
 
 
 def test_a_shape_is_compiled_once():
@@ -179,7 +180,7 @@ def test_the_users_precision_is_left_alone():
 
 
 def test_what_does_not_compile_says_so():
-    prior, z, model, steps = moving()
-    host_only = RobustEKF(9.0, on_violation="raise")
+    prior, z, sensor, dynamics, steps = moving()
+    host_only = Filter(rule=Robust(9.0, on_violation="raise"))
     with pytest.raises(SweepError, match=r"configuration 0 to 5: TracerBoolConversionError"):
-        jitted(host_only, prior, z, model, steps, z_varies=True)
+        jitted(host_only, prior, z, sensor, steps, dynamics=dynamics, z_per_step=True)

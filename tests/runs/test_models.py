@@ -22,8 +22,7 @@ from polar_models import (
     quiet,
 )
 
-from navfilters import FILTERS, Gaussian, SweepError, run
-from navfilters.estimators.extended import ExtendedKalman
+from navfilters import FILTERS, Filter, Gaussian, SweepError, run
 from navfilters.runs.trees import flatten, unflatten
 
 
@@ -145,29 +144,28 @@ class Forgetting(NamedTuple):
     floor: Any = 0.1
 
     def init(self, prior):
-        return ExtendedKalman().init(prior)
+        return Filter().init(prior)
 
-    def step(self, state, z, dynamics, sensor):
-        mean, cov = ExtendedKalman().step(state, z, dynamics, sensor).estimate
+    def step(self, state, z, sensor, dynamics, k):
+        after = Filter().step(state, z, sensor, dynamics, k)
+        mean, cov = after.estimate
         gain = cov.__array_namespace__().asarray(self.gain)[..., None, None]
-        return type(state)(Gaussian(mean, gain * cov + self.floor))
-
-
-class Pair(NamedTuple):
-    dynamics: Any
-    sensor: Any
+        return after._replace(estimate=Gaussian(mean, gain * cov + self.floor))
 
 
 @engines
 @pytest.mark.parametrize("gain", [0.5, np.linspace(0.1, 0.5, 5)], ids=["one", "each its own"])
-@pytest.mark.parametrize("pair", [lambda *two: two, Pair], ids=["tuple", "named tuple"])
-def test_filters_with_a_memory_and_their_models_as_named_tuples(gain, pair, engine):
-    filter_, models = Forgetting(gain), pair(Still(MANY), AsNamedTuple(R))
-    got = quiet(filter_, PRIORS, Z, models, 3, engine=engine, chunk=2).final.estimate
+def test_filters_of_others_and_their_models_as_named_tuples(gain, engine):
+    filter_, sensor, motion = Forgetting(gain), AsNamedTuple(R), Still(MANY)
+    options = {"dynamics": motion, "engine": engine, "chunk": 2}
+    got = quiet(filter_, PRIORS, Z, sensor, 3, **options).final
     state = filter_.init(PRIORS)
-    for _ in range(3):
-        state = filter_.step(state, Z, *models)
+    for k in range(3):
+        state = filter_.step(state, Z, sensor, motion, k)
     assert_allclose(got.mean, state.estimate.mean, rtol=1e-12)
+    assert_allclose(got.cov, state.estimate.cov, rtol=1e-12)
+    wanted = run(filter_, PRIORS, Z, sensor, 3, dynamics=motion)
+    assert_allclose(got.mean, wanted.mean[-1], rtol=1e-12)
 
 
 # --- what would be dealt out wrongly ------------------------------------------------------------
@@ -245,7 +243,7 @@ def test_arrays_in_a_model_or_a_filter_are_looked_at(bad):
     model = Shifted(R, bad)
     with pytest.raises(ValueError, match=r"(model.offset|the value of model.h) must"):
         quiet(FILTERS["EKF"], PRIORS, Z, model, 2)
-    with pytest.raises(ValueError, match=r"estimator.bump must"):
+    with pytest.raises(ValueError, match=r"estimator.variant.bump must"):
         quiet(partial(FILTERS["B-EKF 1"], bump=bad), PRIORS, Z, AsDataclass(R), 2)
 
 

@@ -11,6 +11,7 @@ from numpy.testing import assert_array_equal
 
 from navfilters import FILTERS, Gaussian, SweepError, sweep
 from navfilters.papers.perea2007.experiment import Setup
+from navfilters.runs import records
 from navfilters.runs import workers as places
 
 BASE = Setup()
@@ -36,7 +37,7 @@ def losing(*lost):
     return place
 
 
-@pytest.mark.parametrize("keep", [["final"], ["indefinite"], ["history", "final"]])
+@pytest.mark.parametrize("record", [None, records.definite, records.estimate])
 @pytest.mark.parametrize(
     ("lost", "message"),
     [
@@ -45,10 +46,10 @@ def losing(*lost):
         (range(12), r"found 12 that never arrived: 0, 1, .*, 8, \.\.\.$"),
     ],
 )
-def test_a_chunk_that_never_arrived_is_named(monkeypatch, lost, message, keep):
+def test_a_chunk_that_never_arrived_is_named(monkeypatch, lost, message, record):
     monkeypatch.setattr(places, "in_turn", losing(*lost))
     with pytest.raises(SweepError, match=f"sweep must have every chunk; {message}"):
-        quiet(EKF, priors(), chunk=5, keep=keep, workers=1)
+        quiet(EKF, priors(), chunk=5, record=record, workers=1)
 
 
 def test_what_a_checkpoint_has_need_not_arrive_again(monkeypatch, tmp_path):
@@ -87,7 +88,7 @@ def rounded(prior, z, model):
 
 @pytest.mark.parametrize("estimator", [averages, shortened, widened, rounded])
 def test_a_chunk_of_another_shape_or_type_is_no_result(estimator):
-    message = r"chunk 0, configurations 0 to 6: estimator must return arrays .*; found final.mean"
+    message = r"chunk 0, configurations 0 to 6: estimator must return arrays .*; found state.estimate.mean"
     with pytest.raises(SweepError, match=message):
         quiet(estimator, priors(), chunk=7)
 

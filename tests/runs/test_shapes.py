@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from discrete_systems import ekf as discrete
 from discrete_systems import predict, update
+from navfilters.estimators.multiplicative import MekfState, mekf_update
 from wrong_models import ALONE, PRIORS, RIGHT, WRONG, Model, Z
 
-from navfilters import FILTERS, Gaussian, SigmaPoints, sweep
-from navfilters.estimators.adaptive import AdaptiveEKF
+from navfilters import FILTERS, Filter, Gaussian, SigmaPoints, run, sweep
+from navfilters.estimators.adaptive import AdaptiveNoise
 from navfilters.estimators.continuous import (
     ContinuousSystem,
     Reference,
@@ -18,9 +19,7 @@ from navfilters.estimators.continuous import (
 )
 from navfilters.estimators.continuous import extended_kalman_bucy as continuous
 from navfilters.estimators.discrete import DiscreteSystem
-from navfilters.estimators.extended import ExtendedKalman
-from navfilters.estimators.multiplicative import MekfState, mekf_update
-from navfilters.estimators.robust import AdaptiveRobustEKF, RobustEKF
+from navfilters.estimators.robust import AdaptiveRobust, Robust
 from navfilters.space.quaternions import normalized
 
 PRIORS3 = Gaussian(PRIORS.mean, np.stack([PRIORS.cov] * 3))
@@ -96,8 +95,8 @@ class Tripled(Moving):
 
 
 class Gathering(Moving):
-    def accumulate(self, Q, x):
-        return np.array([0.1, 0.2])
+    def propagate(self, x, Q):
+        return x, np.eye(2), np.array([0.1, 0.2])
 
 
 GOOD_Q = 0.1 * np.eye(2)
@@ -105,29 +104,37 @@ MOTION = {
     "Q: deviations": (Moving(np.array([0.1, 0.2])), "Q must"),
     "Q: a number": (Moving(0.1), "Q must"),
     "Q: of three": (Moving(np.eye(3)), "Q must"),
-    "f: one component": (Moving(GOOD_Q, lambda x: x[..., :1]), "f.x. of .*transition must"),
-    "f: a number": (Moving(GOOD_Q, lambda x: np.float64(1.0)), "f.x. of .*transition must"),
+    "f: one component": (
+        Moving(GOOD_Q, lambda x: x[..., :1]),
+        "(f.x. of .*transition|dynamics.f) must",
+    ),
+    "f: a number": (
+        Moving(GOOD_Q, lambda x: np.float64(1.0)),
+        "(f.x. of .*transition|dynamics.f) must",
+    ),
     "F: a row": (Moving(GOOD_Q, F=lambda x: np.ones((1, 2))), "F of .*transition must"),
     "F: a number": (Moving(GOOD_Q, F=lambda x: np.float64(1.0)), "F of .*transition must"),
     "F: a vector": (Moving(GOOD_Q, F=lambda x: np.ones(2)), "F of .*transition must"),
-    "accumulate": (Gathering(GOOD_Q), "(accumulate|dynamics.Q) must"),
+    "propagate": (Gathering(GOOD_Q), "(W of dynamics.propagate|dynamics.Q) must"),
 }
-REMEMBERING = [
-    ExtendedKalman(),
-    RobustEKF(),
-    AdaptiveEKF(directions=np.eye(2)),
-    AdaptiveRobustEKF(),
-]
+REMEMBERING = {
+    "no rule": Filter(),
+    "second order": FILTERS["mtSOF"],
+    "robust": Filter(rule=Robust()),
+    "adaptive": Filter(rule=AdaptiveNoise(directions=np.eye(2))),
+    "adaptive robust": Filter(rule=AdaptiveRobust()),
+}
 
 
-@pytest.mark.parametrize("filter_", REMEMBERING, ids=lambda f: type(f).__name__)
+@pytest.mark.parametrize("filter_", REMEMBERING.values(), ids=REMEMBERING)
 @pytest.mark.parametrize("wrong", MOTION)
 def test_a_motion_model_is_looked_at(wrong, filter_):
     model, message = MOTION[wrong]
     with pytest.raises(ValueError, match=message):
-        filter_.step(filter_.init(PRIORS), Z, model, RIGHT)
-    with pytest.raises(ValueError, match=rf"model\[0\].*{message}|{message}"):
-        sweep(filter_, PRIORS, Z, (model, RIGHT), 2, progress=False)
+        filter_.step(filter_.init(PRIORS), Z, RIGHT, model)
+    for go in (run, partial(sweep, progress=False)):
+        with pytest.raises(ValueError, match=message):
+            go(filter_, PRIORS, Z, RIGHT, 2, dynamics=model)
 
 
 def test_a_motion_model_that_mixes_the_batch_is_refused_by_sweep():
@@ -138,14 +145,26 @@ def test_a_motion_model_that_mixes_the_batch_is_refused_by_sweep():
         Moving(-GOOD_Q),
         Tripled(GOOD_Q),
     ):
-        with pytest.raises(ValueError, match=r"model\[0\]"):
-            sweep(ExtendedKalman(), PRIORS, Z, (model, RIGHT), 2, progress=False)
+        for go in (run, partial(sweep, progress=False)):
+            with pytest.raises(ValueError, match=r"dynamics\..* must"):
+                go(Filter(), PRIORS, Z, RIGHT, 2, dynamics=model)
 
 
 def test_priors_of_filters_with_a_memory_fit():
-    for prior in (Gaussian(PRIORS.mean, np.eye(3)), Gaussian(np.float64(1.0), np.eye(1))):
+    """A manifold's error may have fewer components than its states: of init only a model knows."""
+    for prior in (
+        Gaussian(PRIORS.mean, np.ones(2)),
+        Gaussian(PRIORS.mean, np.ones((2, 3))),
+        Gaussian(np.float64(1.0), np.eye(1)),
+        Gaussian(PRIORS.mean, 1.0),
+    ):
         with pytest.raises(ValueError, match=r"prior.* must have shape"):
-            RobustEKF().init(prior)
+            Filter(rule=Robust()).init(prior)
+    for name in FILTERS:
+        with pytest.raises(ValueError, match=r"must have shape"):
+            FILTERS[name](Gaussian(PRIORS.mean, np.eye(3)), Z, RIGHT)
+        with pytest.raises(ValueError, match=r"prior.cov must have shape \(..., 2, 2\); found"):
+            run(FILTERS[name], Gaussian(PRIORS.mean, np.eye(3)), Z, RIGHT, 1)
 
 
 # --- discrete and continuous systems ------------------------------------------------------------

@@ -4,16 +4,17 @@ from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
+import naive
 import numpy as np
 import pytest
 from naive import covariances
-from numpy.testing import assert_allclose, assert_array_equal
-
-from navfilters import FILTERS, Gaussian, SweepError, sweep
-from navfilters.estimators.extended import ExtendedKalman
 from navfilters.estimators.multiplicative import MekfState, mekf_update
-from navfilters.estimators.robust import AdaptiveRobustEKF
+from numpy.testing import assert_allclose
+
+from navfilters import FILTERS, Filter, Gaussian, SweepError, run, sweep
+from navfilters.estimators.robust import AdaptiveRobust
 from navfilters.models import Linear
+from navfilters.runs import records
 from navfilters.space.frames import body_axes, ellipsoid_intersection, enu_covariance
 from navfilters.space.image_measurement import Measurement, SarGeometry
 from navfilters.space.quaternions import from_rotation_vector, rotation_vector
@@ -35,11 +36,11 @@ def assert_close(got, wanted):
 class Cart:
     """x = (place, speed), pushed in some of the steps: a thruster that fires at known times."""
 
-    push: np.ndarray  # (steps,), of which a step uses one
+    push: np.ndarray  # (steps,)
     Q: np.ndarray
 
-    def at(self, step):
-        return Pushed(self.push[step], self.Q)
+    def at(self, k):
+        return Pushed(self.push[k], self.Q)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,19 +54,6 @@ class Pushed:
         return (F @ x[..., None])[..., 0] + self.push * xp.asarray([0.5, 1.0]), F
 
 
-@dataclass(frozen=True)
-class Timed:
-    """A filter of dynamics that know the time."""
-
-    filter: object
-
-    def init(self, prior):
-        return self.filter.init(prior)
-
-    def step(self, state, z, dynamics, sensor, *, step):
-        return self.filter.step(state, z, dynamics.at(step), sensor)
-
-
 def pushed(steps=7, count=5):
     rng = np.random.default_rng(0)
     prior = Gaussian(rng.normal(size=(count, 2)), covariances(rng, (count,), 2))
@@ -75,42 +63,89 @@ def pushed(steps=7, count=5):
 
 
 @engines
-@pytest.mark.parametrize("filter_", [ExtendedKalman(), AdaptiveRobustEKF()])
+@pytest.mark.parametrize("filter_", [Filter(), Filter(rule=AdaptiveRobust())])
 def test_a_swept_filter_knows_the_step(filter_, engine):
-    """The AREKF's first step is compiled on its own."""
+    """The adaptive robust filter's first step is compiled on its own."""
     prior, z, dynamics, sensor, steps = pushed()
-    got = quiet(
-        Timed(filter_),
-        prior,
-        z,
-        (dynamics, sensor),
-        steps,
-        z_varies=True,
-        engine=engine,
-        keep=["final", "history"],
-        chunk=2,
-    )
+    options = {"dynamics": dynamics, "z_per_step": True, "record": records.estimate}
+    got = quiet(filter_, prior, z, sensor, steps, **options, engine=engine, chunk=2)
     state, states = filter_.init(prior), [prior]
     for k in range(steps):
-        state = filter_.step(state, z[k], Pushed(dynamics.push[k], dynamics.Q), sensor)
+        state = filter_.step(state, z[k], sensor, Pushed(dynamics.push[k], dynamics.Q))
         states.append(state.estimate)
-    assert_close(got.final.estimate, state.estimate)
-    assert_close(got.history, map(np.stack, zip(*states, strict=True)))
+    assert_close(got.final, state.estimate)
+    assert_close(got.record, map(np.stack, zip(*states, strict=True)))
+    assert_close(got.record, run(filter_, prior, z, sensor, steps, **options))
 
 
-def gated(prior, z, model, step, *, every=1):
-    """The EKF, which uses every second or third measurement only."""
-    xp = prior.mean.__array_namespace__()
-    updated = FILTERS["EKF"](prior, z, model)
-    used = step % every == 0
-    return Gaussian(*(xp.where(used, new, old) for new, old in zip(updated, prior, strict=True)))
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """A sensor that is somewhere else at each step, and the better the later."""
+
+    H: np.ndarray  # (steps, m, n)
+    R: np.ndarray
+
+    def at(self, k):
+        return Seen(self.H[k], self.R / (1.0 + k))
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    H: np.ndarray
+    R: np.ndarray
+
+    def h(self, x):
+        return (self.H @ x[..., None])[..., 0]
+
+    def jacobian(self, x):
+        return self.H
+
+
+@engines
+@pytest.mark.parametrize("name", ["EKF", "UKF", "B-EKF 1"])
+def test_a_sensor_may_be_another_at_each_step(name, engine):
+    """Under JAX its arrays are indexed by a number that is traced."""
+    rng = np.random.default_rng(3)
+    prior, z, dynamics, _, steps = pushed()
+    sensor = Moved(rng.normal(size=(steps, 1, 2)), np.array([[0.5]]))
+    options = {"z_per_step": True, "dynamics": dynamics, "record": records.estimate}
+    got = quiet(FILTERS[name], prior, z, sensor, steps, **options, engine=engine, chunk=2)
+    x, P = prior.mean, prior.cov
+    F = np.array([[1.0, 1.0], [0.0, 1.0]])
+    for k in range(steps):
+        x = x @ F.T + dynamics.push[k] * np.array([0.5, 1.0])
+        P = F @ P @ F.T + dynamics.Q
+        H, R = sensor.H[k], sensor.R / (1 + k)
+        noise = R + H @ P @ H.T * (name == "B-EKF 1")
+        each = [naive.kalman(*m, H, R_i) for *m, R_i in zip(x, P, z[k], noise + 0 * P[:, :1, :1])]
+        x, P = map(np.stack, zip(*each, strict=True))
+        assert_allclose(got.record.mean[k + 1], x, rtol=0, atol=1e-11 * np.abs(x).max())
+        assert_allclose(got.record.cov[k + 1], P, rtol=0, atol=1e-11 * np.abs(P).max())
+    assert_close(run(FILTERS[name], prior, z, sensor, steps, **options), got.record)
+
+
+@dataclass(frozen=True)
+class Gated:
+    """The EKF, which uses every second or third measurement only: a filter of somebody's own."""
+
+    every: int = 1
+
+    def init(self, prior):
+        return FILTERS["EKF"].init(prior)
+
+    def step(self, state, z, sensor, dynamics, k):
+        after = FILTERS["EKF"].step(state, z, sensor, dynamics, k)
+        xp = state.estimate.mean.__array_namespace__()
+        pairs = zip(after.estimate, state.estimate, strict=True)
+        kept = [xp.where(k % self.every == 0, new, old) for new, old in pairs]
+        return state._replace(estimate=Gaussian(*kept))
 
 
 @engines
 @pytest.mark.parametrize("every", [1, 2, 3])
-def test_a_filter_without_a_memory_knows_the_step_too(every, engine):
+def test_a_filter_of_ones_own_knows_the_step_too(every, engine):
     prior, _, _, sensor, _ = pushed()
-    got = quiet(partial(gated, every=every), prior, [0.3], sensor, 7, engine=engine)
+    got = quiet(Gated(every), prior, [0.3], sensor, 7, engine=engine)
     wanted = prior
     for k in range(7):
         if k % every == 0:
@@ -118,29 +153,19 @@ def test_a_filter_without_a_memory_knows_the_step_too(every, engine):
     assert_close(got.final, wanted)
 
 
-def test_a_step_that_has_a_value_is_left_alone():
-    """An option of that name is the user's: bound, or with a default."""
-    prior, _, _, sensor, _ = pushed()
-    fixed = quiet(partial(gated, every=2, step=1), prior, [0.3], sensor, 3).final
-    assert_array_equal(fixed.cov, prior.cov)  # no step is even
-    assert_array_equal(
-        quiet(lambda prior, z, model, step=None: prior, prior, [0.3], sensor, 3).final.cov,
-        prior.cov,
-    )
-
-
 def test_an_exception_at_a_step_names_the_configuration():
     prior, _, _, sensor, _ = pushed()
 
-    def breaks(prior, z, model, step):
-        if step == 2 and (prior.mean == PRIOR_3).all(axis=-1).any():
-            raise ZeroDivisionError("third step")
-        return prior
+    class Breaks(Gated):
+        def step(self, state, z, sensor, dynamics, k):
+            if k == 2 and (state.estimate.mean == PRIOR_3).all(axis=-1).any():
+                raise ZeroDivisionError("third step")
+            return state
 
     PRIOR_3 = prior.mean[3]
     with pytest.raises(SweepError, match="configuration 3: ZeroDivisionError: third step"):
-        quiet(breaks, prior, [0.3], sensor, 3)
-    quiet(breaks, prior, [0.3], sensor, 2)
+        quiet(Breaks(), prior, [0.3], sensor, 3)
+    quiet(Breaks(), prior, [0.3], sensor, 2)
 
 
 # --- a state with a quaternion ------------------------------------------------------------------
@@ -183,9 +208,9 @@ class ImageFilter:
     def init(self, prior):
         return Flown(mekf_state(*prior))
 
-    def step(self, state, z, _, images, *, step):
-        measurement = Measurement(images.pixels[step], z[..., 2], z[..., 3])
-        beta = 0.5 * (step < self.underweighted)
+    def step(self, state, z, images, dynamics, k):
+        measurement = Measurement(images.pixels[k], z[..., 2], z[..., 3])
+        beta = 0.5 * (k < self.underweighted)
         update = mekf_update(state.mekf, measurement, images.geometry, underweighting=beta)
         return Flown(update.state)
 
@@ -219,12 +244,11 @@ def test_the_multiplicative_filter_is_swept_as_one_with_a_memory(engine):
         ImageFilter(2),
         prior,
         z,
-        (None, Images(GEOMETRY, pixels)),
+        Images(GEOMETRY, pixels),
         steps,
-        z_varies=True,
+        z_per_step=True,
         engine=engine,
-        truth=np.broadcast_to(R0, (steps + 1, 3)),
-        keep=["final", "error"],
+        record=records.Distance(R0),
         chunk=2,
     )
     state = mekf_state(prior.mean, np.broadcast_to(prior.cov, (count, 9, 9)))
@@ -233,10 +257,10 @@ def test_the_multiplicative_filter_is_swept_as_one_with_a_memory(engine):
         seen = Measurement(pixels[k], z[k, :, 2], z[k, :, 3])
         state = mekf_update(state, seen, GEOMETRY, underweighting=0.5 if k < 2 else 0.0).state
         errors.append(np.linalg.norm(state.r - R0, axis=-1))
-    assert_allclose(got.error, np.stack(errors), rtol=0, atol=1e-6)
-    for ours, theirs in zip(got.final.mekf[:3], state[:3], strict=True):
+    assert_allclose(got.record, np.stack(errors), rtol=0, atol=1e-6)
+    for ours, theirs in zip(got.state.mekf[:3], state[:3], strict=True):
         assert_allclose(ours, theirs, rtol=0, atol=1e-12 * np.abs(theirs).max())
     deviation = np.sqrt(np.diagonal(state.P, axis1=-2, axis2=-1))
     scale = deviation[:, :, None] * deviation[:, None, :]
-    assert_allclose(got.final.mekf.P / scale, state.P / scale, rtol=0, atol=1e-9)
+    assert_allclose(got.state.mekf.P / scale, state.P / scale, rtol=0, atol=1e-9)
     assert (deviation < SIGMA).all()  # the images did tell something

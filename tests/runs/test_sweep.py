@@ -11,9 +11,10 @@ from naive import covariances, quadratic
 from numpy.testing import assert_array_equal
 
 from navfilters import FILTERS, Gaussian, SigmaPoints, SweepError, first_indefinite, run, sweep
-from navfilters.estimators.extended import ExtendedKalman
 from navfilters.models import Linear, RangeBearing
+from navfilters.papers.perea2007.experiment import FILTERS as PAPER
 from navfilters.papers.perea2007.experiment import Setup, position_error
+from navfilters.runs import records
 from navfilters.runs.problems import CACHED, SENT, Problem
 
 BASE = Setup()
@@ -36,58 +37,75 @@ def assert_same(got, wanted):
 # --- what is kept -------------------------------------------------------------------------------
 
 
+def everything(state):
+    distance = records.Distance(np.array(BASE.x_true))
+    return records.estimate(state), records.definite(state), distance(state)
+
+
 @pytest.mark.parametrize("steps", [0, 1, 2, 25])
 @pytest.mark.parametrize("name", ["EKF", "B-EKF 4", "mtSOF", "UKF"])
 def test_everything_kept_is_that_of_a_run(name, steps):
-    truth = np.array(BASE.x_true)
     got = quiet(
         FILTERS[name],
         priors(),
         BASE.z,
         MODEL,
         steps,
-        keep=["history", "error", "final", "indefinite"],
-        truth=truth,
+        record=everything,
         chunk=4,
     )
     wanted = run(FILTERS[name], priors(), BASE.z, MODEL, steps)
-    assert_same(got.history, wanted)
+    history, definite, error = got.record
+    assert isinstance(history, Gaussian)
+    assert_same(history, wanted)
     assert_same(got.final, (wanted.mean[-1], wanted.cov[-1]))
-    assert_array_equal(got.indefinite, first_indefinite(wanted.cov))
-    assert_array_equal(got.error, position_error(wanted.mean, truth))
+    assert_array_equal(first_indefinite(definite), first_indefinite(wanted.cov))
+    assert_array_equal(error, position_error(wanted.mean, BASE.x_true))
 
 
 def test_only_what_is_asked_for_is_kept():
     got = quiet(EKF, priors(), BASE.z, MODEL, 3)
     assert isinstance(got.final, Gaussian)
-    assert got.indefinite is got.error is got.history is None
-    got = quiet(EKF, priors(), BASE.z, MODEL, 3, keep={"indefinite"})
-    assert got.final is None
-    assert got.indefinite.tolist() == [-1] * 11
+    assert got.final is got.state.estimate
+    assert got.record is None
+    got = quiet(EKF, priors(), BASE.z, MODEL, 3, record=records.definite)
+    assert got.record.dtype == bool
+    assert got.record.shape == (4, 11)
+    assert first_indefinite(got.record).tolist() == [-1] * 11
 
 
 def test_where_the_papers_filters_lose_definiteness():
     """Sections V and VI: the mtSOF at its first update, the bumped one at the 23rd."""
     for name, step in (("mtSOF", 1), ("B-mtSOF", 23), ("EKF", -1)):
-        got = quiet(FILTERS[name], BASE.prior, BASE.z, MODEL, 30, keep=["indefinite"])
-        assert got.indefinite == step
+        got = quiet(PAPER[name], BASE.prior, BASE.z, MODEL, 30, record=records.definite)
+        assert first_indefinite(got.record) == step
 
 
 def test_one_configuration_has_no_batch_axes():
-    got = quiet(EKF, BASE.prior, BASE.z, MODEL, 5, keep=["final", "history"])
+    got = quiet(EKF, BASE.prior, BASE.z, MODEL, 5, record=records.estimate)
     assert got.final.mean.shape == (2,)
-    assert got.history.cov.shape == (6, 2, 2)
+    assert got.record.cov.shape == (6, 2, 2)
     wanted = run(EKF, Gaussian(BASE.prior.mean[None], BASE.prior.cov[None]), BASE.z, MODEL, 5)
-    assert_array_equal(got.history.cov, wanted.cov[:, 0])
+    assert_array_equal(got.record.cov, wanted.cov[:, 0])
 
 
-def test_a_truth_may_move_and_have_fewer_components():
+def test_a_truth_may_be_each_members_and_have_fewer_components():
     rng = np.random.default_rng(2)
     z = BASE.z + rng.normal(size=(4, 11, 2)) * [1.0, 0.01]
-    truth = rng.normal(size=(5, 1, 1))
-    got = quiet(EKF, priors(), z, MODEL, 4, keep=["error"], truth=truth, z_varies=True, chunk=3)
-    mean = run(EKF, priors(), z, MODEL, 4, z_varies=True).mean
-    assert_array_equal(got.error, np.abs(mean[..., 0] - truth[..., 0]))
+    truth = rng.normal(size=(11, 1))
+    record = records.Distance(truth)
+    got = quiet(EKF, priors(), z, MODEL, 4, record=record, z_per_step=True, chunk=3)
+    mean = run(EKF, priors(), z, MODEL, 4, z_per_step=True).mean
+    assert_array_equal(got.record, np.abs(mean[..., 0] - truth[:, 0]))
+    assert_array_equal(run(EKF, priors(), z, MODEL, z_per_step=True, record=record), got.record)
+
+
+def test_a_truth_has_no_more_components_than_the_state():
+    record = records.Distance(np.ones(3))
+    with pytest.raises(ValueError, match=r"truth must have shape .* k up to 2; found \(3,\)"):
+        run(EKF, priors(), BASE.z, MODEL, 2, record=record)
+    with pytest.raises(SweepError, match=r"truth must have shape .* k up to 2; found \(3,\)"):
+        quiet(EKF, priors(), BASE.z, MODEL, 2, record=record)
 
 
 # --- batches and chunks -------------------------------------------------------------------------
@@ -140,23 +158,24 @@ def test_batch_axes_form_a_grid():
     prior = Gaussian(*(part[:2, None, None] for part in priors()))
     model = RangeBearing(MODEL.R * np.array([1.0, 10.0, 1e3])[:, None, None, None])
     bumped = partial(FILTERS["B-EKF 1"], bump=[0.0, 1.0, 2.0, 3.0])
-    got = quiet(bumped, prior, BASE.z, model, 3, keep=["final", "history", "indefinite"], chunk=5)
+    got = quiet(bumped, prior, BASE.z, model, 3, record=everything, chunk=5)
+    history, definite, _ = got.record
     assert got.final.mean.shape == (2, 3, 4, 2)
-    assert got.history.cov.shape == (4, 2, 3, 4, 2, 2)
-    assert got.indefinite.shape == (2, 3, 4)
+    assert history.cov.shape == (4, 2, 3, 4, 2, 2)
+    assert definite.shape == (4, 2, 3, 4)
     one = partial(FILTERS["B-EKF 1"], bump=2.0)
     alone = run(one, Gaussian(*(p[1] for p in priors())), BASE.z, RangeBearing(MODEL.R * 10.0), 3)
-    np.testing.assert_allclose(got.history.mean[:, 1, 1, 2], alone.mean, rtol=1e-12)
+    np.testing.assert_allclose(history.mean[:, 1, 1, 2], alone.mean, rtol=1e-12)
 
 
 def test_a_measurement_that_varies_is_dealt_out_too():
     z = BASE.z + np.random.default_rng(0).normal(size=(6, 11, 2)) * [1.0, 0.01]
-    got = quiet(EKF, priors(), z, MODEL, 6, z_varies=True, chunk=4).final
-    wanted = run(EKF, priors(), z, MODEL, 6, z_varies=True)
+    got = quiet(EKF, priors(), z, MODEL, 6, z_per_step=True, chunk=4).final
+    wanted = run(EKF, priors(), z, MODEL, 6, z_per_step=True)
     assert_same(got, (wanted.mean[-1], wanted.cov[-1]))
     z = z[:, :1]
-    got = quiet(EKF, priors(), z[:, 0], MODEL, 6, z_varies=True, chunk=4).final
-    wanted = run(EKF, priors(), z, MODEL, 6, z_varies=True)
+    got = quiet(EKF, priors(), z[:, 0], MODEL, 6, z_per_step=True, chunk=4).final
+    wanted = run(EKF, priors(), z, MODEL, 6, z_per_step=True)
     np.testing.assert_allclose(got.mean, wanted.mean[-1], rtol=1e-12)
 
 
@@ -204,13 +223,13 @@ def test_a_member_that_fails_is_nan_alone():
     """At the origin the EKF has no derivative: no warning, no exception."""
     mean = priors().mean.copy()
     mean[4] = 0.0
-    got = quiet(EKF, Gaussian(mean, priors().cov), BASE.z, MODEL, 5, keep=["final", "indefinite"])
+    got = quiet(EKF, Gaussian(mean, priors().cov), BASE.z, MODEL, 5, record=records.definite)
     healthy = quiet(EKF, priors(), BASE.z, MODEL, 5).final
     others = np.arange(11) != 4
     for ours, wanted in zip(got.final, healthy, strict=True):
         assert_array_equal(ours[others], wanted[others])
         assert np.isnan(ours[4]).all()
-    assert got.indefinite.tolist() == [-1] * 4 + [1] + [-1] * 6
+    assert first_indefinite(got.record).tolist() == [-1] * 4 + [1] + [-1] * 6
 
 
 # --- filters with a memory ----------------------------------------------------------------------
@@ -218,25 +237,28 @@ def test_a_member_that_fails_is_nan_alone():
 
 @pytest.mark.parametrize("name", WITH_MEMORY)
 def test_filters_with_a_memory_go_step_by_step(name):
-    """The final state has the counters; the history is of the estimates."""
-    prior, z, model, steps = moving()
-    got = quiet(
-        WITH_MEMORY[name], prior, z, model, steps, z_varies=True, keep=["final", "history"], chunk=4
-    )
+    """The final state has the counters; the record is of the estimates."""
+    prior, z, sensor, dynamics, steps = moving()
+    options = {"dynamics": dynamics, "z_per_step": True, "record": records.estimate, "chunk": 4}
+    got = quiet(WITH_MEMORY[name], prior, z, sensor, steps, **options)
     state, states = WITH_MEMORY[name].init(prior), [prior]
     for k in range(steps):
-        state = WITH_MEMORY[name].step(state, z[k], *model)
+        state = WITH_MEMORY[name].step(state, z[k], sensor, dynamics, k)
         states.append(state.estimate)
-    assert type(got.final) is type(state)
-    assert_same(got.final.estimate, state.estimate)
-    assert_same(got.final[1:], state[1:])
-    assert_same(got.history, map(np.stack, zip(*states, strict=True)))
+    assert type(got.state) is type(state)
+    assert type(got.state.memory) is type(state.memory)
+    assert_same(got.final, state.estimate)
+    assert_same(got.state.memory or (), state.memory or ())
+    assert_same(got.state[3:], state[3:])
+    assert_same(got.record, map(np.stack, zip(*states, strict=True)))
 
 
 def test_a_filter_with_a_memory_and_no_steps():
-    prior, _, model, _ = moving()
-    got = quiet(ExtendedKalman(), prior, np.zeros(2), model, 0)
-    assert_same(got.final.estimate, prior)
+    prior, _, sensor, dynamics, _ = moving()
+    got = quiet(WITH_MEMORY["AREKF"], prior, np.zeros(2), sensor, 0, dynamics=dynamics)
+    assert_same(got.final, prior)
+    assert got.state.innovation is got.state.S is got.state.memory.P_y_bar is None
+    assert got.state.memory.robust.tolist() == got.state.missed.tolist() == [0] * 6
 
 
 # --- sizes --------------------------------------------------------------------------------------
@@ -245,7 +267,7 @@ def test_a_filter_with_a_memory_and_no_steps():
 def size_of(count, n=2, steps=1, series_bytes=0):
     prior = Gaussian(np.ones((count, n)), np.eye(n))
     model = Linear(np.eye(n), np.eye(n))
-    return Problem.of(EKF, prior, np.ones(n), model, None, 1, False).size(steps, series_bytes)
+    return Problem.of(EKF, prior, np.ones(n), model, None, None, 1, False).size(steps, series_bytes)
 
 
 def test_chunks_are_equal_and_fit_the_cache():
@@ -266,7 +288,7 @@ def test_long_sweeps_have_chunks_for_several_workers():
 
 def test_a_series_that_is_given_counts_too():
     z = np.broadcast_to(BASE.z, (1000, 11, 2))
-    problem = Problem.of(EKF, priors(), z, MODEL, None, 1000, True)
+    problem = Problem.of(EKF, priors(), z, MODEL, None, None, 1000, True)
     assert problem.size(1000, SENT // 2 - 1000) == 1
     assert problem.size(1000, 0) == 11
 
@@ -278,7 +300,7 @@ def peak(count, **options):
     """Bytes allocated at one time during a sweep, without its input."""
     many = Gaussian(np.tile(BASE.x0, (count, 1)), np.tile(np.eye(2), (count, 1, 1)))
     tracemalloc.start()
-    quiet(EKF, many, BASE.z, MODEL, keep=["final", "indefinite"], **options)
+    quiet(EKF, many, BASE.z, MODEL, record=records.definite, **options)
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return most
@@ -324,9 +346,9 @@ REFUSED = {
         {"priors": Gaussian(np.ones((0, 2)), np.eye(2))},
         r"priors.*at least one configuration; found.*\(0,\)",
     ),
-    "z: NaN": ({"z": [1.0, np.nan]}, "z must be.*nan"),
+    "z: infinite": ({"z": [1.0, np.inf]}, "z must be finite, or NaN.*inf at index"),
     "z: too few": (
-        {"z": np.ones((4, 2)), "z_varies": True},
+        {"z": np.ones((4, 2)), "z_per_step": True},
         r"z must have.*5 steps; found \(4, 2\)",
     ),
     "z: other batch": ({"z": np.ones((3, 2))}, r"broadcast; found.*priors.mean \(11,\).*z \(3,\)"),
@@ -340,30 +362,25 @@ REFUSED = {
     ),
     "option: other batch": (
         {"estimator": partial(FILTERS["B-EKF 1"], bump=np.ones(3))},
-        r"broadcast; found.*estimator.bump \(3,\)",
+        r"broadcast; found.*estimator.variant.bump \(3,\)",
     ),
     "option: other batch, inside": (
         {"estimator": partial(FILTERS["UKF"], points=SigmaPoints([0.5, 0.7, 1.0]))},
-        r"broadcast; found.*estimator.points.alpha \(3,\)",
+        r"broadcast; found.*estimator.moments.points.alpha \(3,\)",
     ),
     "steps": ({"steps": -1}, "steps must be an integer of at least 0; found -1"),
     "engine": ({"engine": "torch"}, "engine must be 'numpy' or 'jax'; found 'torch'"),
-    "keep: a string": ({"keep": "final"}, "keep must be a collection.*found 'final'"),
-    "keep: unknown": ({"keep": ["last"]}, r"keep must be a collection.*found \['last'\]"),
-    "keep: nothing": ({"keep": []}, r"keep must be.*found \[\]"),
-    "truth: missing": ({"keep": ["error"]}, "truth must be given if.*no truth"),
-    "truth: unused": ({"truth": [1.0, 2.0]}, "truth must be given if.*a truth"),
-    "truth: too many": (
-        {"keep": ["error"], "truth": np.ones(3)},
-        r"truth must have shape \(..., k\) with k up to 2; found \(3,\)",
-    ),
-    "truth: too few steps": (
-        {"keep": ["error"], "truth": np.ones((5, 2)), "z": np.ones((5, 2)), "z_varies": True},
-        r"truth must have shape \(6, ..., k\).*found \(5, 2\)",
+    "truth: other batch": (
+        {"record": records.Distance(np.ones((3, 2)))},
+        r"broadcast; found.*record.truth \(3,\)",
     ),
     "workers": ({"workers": 0}, "workers must be an integer of at least 1; found 0"),
     "chunk": ({"chunk": 1.5}, "chunk must be an integer of at least 1; found 1.5"),
-    "memory: one model": ({"estimator": ExtendedKalman()}, r"model must be \(dynamics, sensor\)"),
+    "dynamics: the sensor": (
+        {"dynamics": MODEL},
+        "dynamics must have Q and one of f, transition and propagate; found RangeBearing",
+    ),
+    "model: the dynamics": ({"model": moving()[3]}, "model must have R, and h.*found Swing"),
 }
 
 
@@ -379,7 +396,7 @@ def test_bad_input_is_refused_before_any_step(changes, message):
 
 
 def test_an_estimator_that_is_none_is_refused():
-    with pytest.raises(TypeError, match=r"estimator must be callable.*init and step; found 'EKF'"):
+    with pytest.raises(TypeError, match=r"estimator must be a filter.*init and step.*found 'EKF'"):
         quiet("EKF", priors(), BASE.z, MODEL, 5)
 
 
@@ -396,5 +413,5 @@ def test_a_result_without_its_configurations_is_refused(estimator):
 
 
 def test_an_option_that_the_filter_lacks_is_refused():
-    with pytest.raises(SweepError, match="configuration 0: TypeError: unknown options"):
+    with pytest.raises(TypeError, match=r"unknown options \['bump'\]; this filter has none"):
         quiet(partial(EKF, bump=1.0), priors(), BASE.z, MODEL)

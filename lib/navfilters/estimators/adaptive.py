@@ -117,6 +117,7 @@ class AdaptiveNoise(Rule):
 
     def process_noise(self, memory: AdaptiveMemory, Q: Array) -> tuple[Array, AdaptiveMemory]:
         """E Q E^T."""
+        validation.core("dynamics.Q", Q, memory.factor.shape[-2:])
         full = (memory.count >= self.N + self.k)[..., None, None]
         E = self._factor(memory.innovations, full)
         if not self.memory:

@@ -7,9 +7,9 @@ from functools import partial
 from typing import Any
 
 from navfilters.estimators import model_parts
-from navfilters.estimators.filter import Filter, first_state, keep, missed, seen
+from navfilters.estimators.filter import Filter
 from navfilters.estimators.prediction import predict_linearized
-from navfilters.estimators.state import FilterState
+from navfilters.estimators.state import FilterState, first_state, keep, missed
 from navfilters.estimators.update import absent
 from navfilters.numerics import validation
 from navfilters.types import Array, Gaussian
@@ -39,7 +39,7 @@ class Memoryless:
 
     def update(self, state: FilterState, z: Array, sensor: Any, k: Array = 0) -> FilterState:
         """The state after a measurement; as it was where anything of z is NaN."""
-        z, sensor = seen(validation.given("z", z), sensor, k)
+        z, sensor = model_parts.seen(validation.given("z", z), sensor, k)
         gone, estimate = absent(z), self.function(state.estimate, z, sensor)
         if gone is not None:
             some = gone.__array_namespace__().any(gone, axis=-1)
@@ -68,22 +68,28 @@ def as_filter(estimator: Any) -> Any:
     TypeError
         Anything else.
     """
-    if hasattr(estimator, "init") and hasattr(estimator, "step"):
-        return estimator
-    if isinstance(estimator, partial) and isinstance(estimator.func, Filter):
-        return estimator.func.having(**estimator.keywords)
-    if callable(estimator) and not isinstance(estimator, type):
-        try:
-            inspect.signature(estimator).bind(None, None, None)
-        except TypeError as error:
-            name = getattr(estimator, "__name__", repr(estimator))
-            raise TypeError(
-                f"estimator must be callable as estimator(prior, z, model); found {name}: {error}"
-            ) from None
-        except ValueError:  # a builtin, whose signature cannot be had
-            pass
-        return Memoryless(estimator)
+    if not isinstance(estimator, type):
+        if hasattr(estimator, "init") and hasattr(estimator, "step"):
+            return estimator
+        if isinstance(estimator, partial) and isinstance(estimator.func, Filter):
+            return estimator.func.having(**estimator.keywords)
+        if callable(estimator):
+            _takes_three(estimator)
+            return Memoryless(estimator)
     raise TypeError(
         "estimator must be a filter such as FILTERS['EKF'], an object with init and step, or "
         f"callable as estimator(prior, z, model); found {estimator!r}"
     )
+
+
+def _takes_three(function: Callable) -> None:
+    """TypeError for a function that cannot be called as (prior, z, model)."""
+    try:
+        inspect.signature(function).bind(None, None, None)
+    except TypeError as error:
+        name = getattr(function, "__name__", repr(function))
+        raise TypeError(
+            f"estimator must be callable as estimator(prior, z, model); found {name}: {error}"
+        ) from None
+    except ValueError:  # a builtin, whose signature cannot be had
+        return

@@ -21,8 +21,8 @@ from navfilters.estimators.prediction import (
     predict_second_order,
     predict_unscented,
 )
-from navfilters.estimators.rule import Rule, zeros
-from navfilters.estimators.state import FilterState
+from navfilters.estimators.rule import Rule
+from navfilters.estimators.state import FilterState, first_state, given_prior, keep, missed
 from navfilters.estimators.update import (
     FORMS,
     Form,
@@ -106,11 +106,11 @@ class Filter:
                 f"{type(self.rule).__name__}"
             )
         self._know(options)
-        prior, z = _given(prior), validation.given("z", z)
+        prior, z = given_prior(prior), validation.given("z", z)
         moments = self.moments(prior, model, **_accepted(self.moments, options))
         changed, moments = self.variant(prior, model, moments, **_accepted(self.variant, options))
         updated = kalman_update(changed, z, moments, form=self.form, model=model)
-        return _kept(absent(z), prior, updated)
+        return kept(absent(z), prior, updated)
 
     @property
     def options(self) -> tuple[str, ...]:
@@ -204,7 +204,7 @@ class Filter:
         -------
         FilterState
         """
-        z, sensor = seen(validation.given("z", z), sensor, k)
+        z, sensor = model_parts.seen(validation.given("z", z), sensor, k)
         gone = absent(z)
         prior, memory, moments = state.estimate, state.memory, None
         if self.rule is not None:
@@ -216,7 +216,7 @@ class Filter:
         fit(prior, z, moments)
         y = innovation(z, moments, sensor)
         estimate = correct(prior, y, moments, self.form, sensor, gone)
-        estimate = _kept(gone, state.estimate, estimate)
+        estimate = kept(gone, state.estimate, estimate)
         return FilterState(estimate, missed(state, gone), memory, y, moments.P_zz)
 
     def _ruled(
@@ -279,7 +279,7 @@ class Filter:
             Computed in the information form, (P^-1 + H^T R^-1 H)^-1, by LAPACK: no line of the
             filters takes part.
         """
-        z, prior = validation.given("z", z), _given(prior)
+        z, prior = validation.given("z", z), given_prior(prior)
         H, R = model.jacobian(prior.mean), model_parts.noise(model, prior.mean)
         P = prior.cov if self.rule is None else self.rule.limit(prior.cov)
         variant = model_parts.at(self.variant, 0)
@@ -289,52 +289,6 @@ class Filter:
         cov = np.linalg.inv(np.linalg.inv(P) + weight @ H)
         residual = z - (H @ prior.mean[..., None])[..., 0]
         return Gaussian(prior.mean + (cov @ weight @ residual[..., None])[..., 0], cov)
-
-
-def _given(prior: Gaussian) -> Gaussian:
-    mean, cov = prior.mean, prior.cov
-    if type(mean) is type(cov) is np.ndarray and mean.dtype.char == cov.dtype.char == "d":
-        return prior
-    return Gaussian(validation.given("prior.mean", mean), validation.given("prior.cov", cov))
-
-
-def first_state(prior: Gaussian, rule: Rule | None = None) -> FilterState:
-    """The state before any step, of a filter with this rule."""
-    prior = _given(prior)
-    return FilterState(prior, zeros(prior), None if rule is None else rule.init(prior))
-
-
-def seen(z: Array, sensor: Any, k: Array) -> tuple[Array, MeasurementModel]:
-    """What is compared with the sensor of step k, and that sensor."""
-    sensor = model_parts.at(sensor, k)
-    return sensor.given(z) if hasattr(sensor, "given") else (z, sensor)
-
-
-def missed(state: FilterState, gone: Array | None) -> Array:
-    """The counter of updates at which nothing was measured."""
-    if gone is None:
-        return state.missed
-    return state.missed + gone.__array_namespace__().all(gone, axis=-1)
-
-
-def _kept(gone: Array | None, before: Gaussian, after: Gaussian) -> Gaussian:
-    """The estimate as it was in the members of which nothing was measured."""
-    if gone is None:
-        return after
-    return keep(gone.__array_namespace__().all(gone, axis=-1), before, after)
-
-
-def keep(some: Array, before: Any, after: Any) -> Any:
-    """``before`` in some members, ``after`` in the others, part by part."""
-    if after is None:
-        return None
-    if isinstance(after, tuple):
-        olds = (None,) * len(after) if before is None else before
-        parts = [keep(some, old, new) for old, new in zip(olds, after, strict=True)]
-        return type(after)(*parts) if hasattr(after, "_fields") else tuple(parts)
-    xp = after.__array_namespace__()
-    where = some[(..., *(None,) * (after.ndim - some.ndim))]
-    return xp.where(where, xp.nan if before is None else before, after)
 
 
 @lru_cache  # a signature costs as much as half an update of one member

@@ -13,6 +13,12 @@ def at(model: Any, k: int) -> Any:
     return model.at(k) if hasattr(model, "at") else model
 
 
+def seen(z: Array, sensor: MeasurementModel, k: Array) -> tuple[Array, MeasurementModel]:
+    """What is compared with the sensor of step k, and that sensor."""
+    sensor = at(sensor, k)
+    return sensor.given(z) if hasattr(sensor, "given") else (z, sensor)
+
+
 def noise(model: MeasurementModel, x: Array | None = None) -> Array:
     """A model's R, if it is one: a vector or a number would be added to every row.
 

@@ -121,6 +121,8 @@ def unscented(
     ----------
     perea2007, Eqs. (21)-(25); its Eq. (26) is empty.
     """
+    if not hasattr(model, "retract"):
+        validation.core("prior.cov", prior.cov, prior.mean.shape[-1:] * 2)
     root, exact = root_of(prior.cov, points.root)
     dX = offsets(prior, points, root)
     X = retract(model, prior.mean, dX)

@@ -3,6 +3,10 @@
 from math import log, pi
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from navfilters.estimators.rule import Rule, zeros
+from navfilters.numerics import validation
 from navfilters.numerics.small_matrices import cholesky, is_positive_definite
 from navfilters.types import Array, Gaussian
 
@@ -54,3 +58,48 @@ class FilterState(NamedTuple):
         mean, cov = self.estimate
         xp = mean.__array_namespace__()
         return xp.all(xp.isfinite(mean), axis=-1) & is_positive_definite(cov)
+
+
+def given_prior(prior: Gaussian) -> Gaussian:
+    """A prior whose arrays are of a kind that products keep."""
+    mean, cov = prior.mean, prior.cov
+    if type(mean) is type(cov) is np.ndarray and mean.dtype.char == cov.dtype.char == "d":
+        return prior
+    return Gaussian(validation.given("prior.mean", mean), validation.given("prior.cov", cov))
+
+
+def first_state(prior: Gaussian, rule: Rule | None = None) -> FilterState:
+    """The state before any step, of a filter with this rule."""
+    prior = given_prior(prior)
+    n = prior.cov.shape[-1:] if prior.cov.ndim else (0,)
+    if prior.mean.ndim == 0:
+        raise ValueError("prior.mean must have shape (..., n); found ()")
+    validation.core("prior.cov", prior.cov, n + n)
+    return FilterState(prior, zeros(prior), None if rule is None else rule.init(prior))
+
+
+def missed(state: FilterState, gone: Array | None) -> Array:
+    """The counter of updates at which nothing was measured."""
+    if gone is None:
+        return state.missed
+    return state.missed + gone.__array_namespace__().all(gone, axis=-1)
+
+
+def kept(gone: Array | None, before: Gaussian, after: Gaussian) -> Gaussian:
+    """The estimate as it was in the members of which nothing was measured."""
+    if gone is None:
+        return after
+    return keep(gone.__array_namespace__().all(gone, axis=-1), before, after)
+
+
+def keep(some: Array, before: Any, after: Any) -> Any:
+    """``before`` in some members, ``after`` in the others, part by part."""
+    if after is None:
+        return None
+    if isinstance(after, tuple):
+        olds = (None,) * len(after) if before is None else before
+        parts = [keep(some, old, new) for old, new in zip(olds, after, strict=True)]
+        return type(after)(*parts) if hasattr(after, "_fields") else tuple(parts)
+    xp = after.__array_namespace__()
+    where = some[(..., *(None,) * (after.ndim - some.ndim))]
+    return xp.where(where, xp.nan if before is None else before, after)

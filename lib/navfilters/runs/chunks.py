@@ -7,7 +7,7 @@ import numpy as np
 from navfilters.numerics.allocator import keep_freed_memory
 from navfilters.numerics.small_matrices import WRITTEN_OUT
 from navfilters.runs.march import Chunk, Job, Kept, March
-from navfilters.runs.records import stacked
+from navfilters.runs.records import put
 
 
 class SweepError(RuntimeError):
@@ -53,11 +53,11 @@ def by_numpy(job: Job, arrays: list[np.ndarray]) -> Kept:
         march = March(job, list(map(_members_innermost, arrays, job.axes)))
     with np.errstate(all="ignore"):  # a member that fails is NaN in the result: that is its report
         state, row = march.start()
-        rows = [row]
+        rows = put(None, row, 0, job.steps + 1)
         for k in range(job.steps):
             state, row = march.step(state, k)
-            rows.append(row)
-    return Kept(state, stacked(rows))
+            rows = put(rows, row, k + 1, job.steps + 1)
+    return Kept(state, rows)
 
 
 def _members_innermost(array: np.ndarray, axis: int | None) -> np.ndarray:

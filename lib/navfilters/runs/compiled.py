@@ -6,6 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from navfilters.estimators.any_filter import Memoryless
+from navfilters.estimators.filter import Filter
+from navfilters.estimators.update import COMPLETE
 from navfilters.numerics.extras import missing
 from navfilters.runs.march import Job, Kept, March
 from navfilters.runs.trees import Tree
@@ -50,7 +53,7 @@ def by_jax(job: Job, arrays: list[np.ndarray]) -> Kept:
     with jax.enable_x64(True):
         with _compiling:  # two threads would both compile
             tree = job.tree if job.tree.constant else _Once(job.tree, job.sweep)
-            key = (tree, job.axes, job.steps, job.z_per_step)
+            key = (tree, job.axes, job.steps, job.z_per_step, job.complete)
             run = _program(key, tuple((a.shape, a.dtype) for a in arrays))
         return jax.tree.map(np.asarray, run(arrays))
 
@@ -78,12 +81,16 @@ class _Once:
 @lru_cache(maxsize=64)
 def _program(key: tuple, shapes: tuple) -> Any:
     """The executable of a job for arrays of these shapes."""
-    tree, axes, steps, z_per_step = key
+    tree, axes, steps, z_per_step, complete = key
     if isinstance(tree, _Once):
         tree = tree.tree
     job = Job("jax", tree, axes, (), steps, z_per_step)
     arguments = [jax.ShapeDtypeStruct(*shape) for shape in shapes]
-    return jax.jit(lambda arrays: _in_blocks(job, arrays)).lower(arguments).compile()
+    token = COMPLETE.set(complete)
+    try:
+        return jax.jit(lambda arrays: _in_blocks(job, arrays)).lower(arguments).compile()
+    finally:
+        COMPLETE.reset(token)
 
 
 def _in_blocks(job: Job, arrays: list[jax.Array]) -> Kept:
@@ -122,22 +129,36 @@ def _scan(job: Job, arrays: list[jax.Array]) -> Kept:
     """All steps of some members."""
     march = March(job, arrays)
     state, row = march.start()
-    rows, first = jax.tree.map(lambda a: a[None], row), 0
-    if job.steps and not _alike(state, jax.eval_shape(lambda s: march.step(s, 0)[0], state)):
+    rows = jax.tree.map(lambda a: a[None], row)
+    first, last = 0, job.steps
+    ours = isinstance(march.filter, Filter | Memoryless)
+
+    def carried(state: Any) -> Any:
+        """Without what our own filters only tell: to carry it costs a tenth of a step."""
+        return state._replace(innovation=None, S=None) if ours else state
+
+    def alone(state: Any, rows: Any, k: int) -> tuple[Any, Any]:
+        state, row = march.step(state, k)
+        return state, _below(rows, jax.tree.map(lambda a: a[None], row))
+
+    after = jax.eval_shape(lambda s: march.step(s, 0)[0], state) if job.steps else state
+    if not _alike(carried(state), carried(after)):
         # A filter may begin with None where it will have an array: its first step is another's.
-        state, row = march.step(state, 0)
-        rows = _below(rows, jax.tree.map(lambda a: a[None], row))
-        first = 1
-    if job.steps > first:
-        numbers = jnp.arange(first, job.steps)
-        series = (numbers, march.z[first:] if job.z_per_step else None)
+        (state, rows), first = alone(state, rows, 0), 1
+    last -= ours and last > first
+    if last > first:
+        numbers = jnp.arange(first, last)
+        series = (numbers, march.z[first:last] if job.z_per_step else None)
 
         def step(state, now):
             k, z = now
-            return march.advance(state, k, z if job.z_per_step else march.z)
+            state, row = march.advance(state, k, z if job.z_per_step else march.z)
+            return carried(state), row
 
-        state, more = jax.lax.scan(step, state, series)
+        state, more = jax.lax.scan(step, carried(state), series)
         rows = _below(rows, more)
+    if job.steps > last:
+        state, rows = alone(state, rows, last)
     return Kept(state, rows)
 
 

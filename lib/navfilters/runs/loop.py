@@ -88,13 +88,14 @@ def run(
             f"found {type(estimator).__name__}"
         )
     model_checks.models(model, dynamics, prior, steps)
-    compare_derivatives(estimator, model, dynamics, prior)
+    if steps:
+        compare_derivatives(estimator, model, dynamics, prior)
     if record is not records.estimate and not callable(record):
         raise TypeError(f"record must be callable as record(state); found {record!r}")
     keep_freed_memory()
     with np.errstate(all="ignore"):  # a member that fails is NaN in the result: that is its report
         state = estimator.init(prior)
-        rows = [record(state)]
+        kept = records.put(None, record(state), 0, steps + 1)
         for k in range(steps):
             if callable(z):
                 if dynamics is not None:
@@ -102,9 +103,8 @@ def run(
                 state = estimator.update(state, z(k, state), model, k)
             else:
                 state = estimator.step(state, z[k] if z_per_step else z, model, dynamics, k)
-            rows.append(record(state))
+            kept = records.put(kept, record(state), k + 1, steps + 1)
         derivatives(model, dynamics, state.estimate, steps)
-    kept = records.stacked(rows)
     if record is records.estimate:
         batch = np.broadcast_shapes(batch, kept.mean.shape[1:-1], kept.cov.shape[1:-2])
         return Gaussian(*map(_whole, kept, (batch, batch), (1, 2)))
@@ -115,9 +115,8 @@ def _whole(series: np.ndarray, batch: tuple[int, ...], core: int) -> np.ndarray:
     """A series with all the batch axes."""
     missing = len(batch) + core + 1 - series.ndim
     series = series.reshape(len(series), *(1,) * missing, *series.shape[1:])
-    return np.ascontiguousarray(
-        np.broadcast_to(series, (len(series), *batch, *series.shape[series.ndim - core :]))
-    )
+    whole = (len(series), *batch, *series.shape[series.ndim - core :])
+    return series if series.shape == whole else np.broadcast_to(series, whole).copy()
 
 
 def first_indefinite(cov: Array) -> np.ndarray:

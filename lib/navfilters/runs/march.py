@@ -25,6 +25,8 @@ class Job:
     steps : int
     z_per_step : bool
         Whether z is a series over the steps.
+    complete : bool
+        Whether it is known that z has no NaN.
     sweep : str
         Another one for every sweep.
     """
@@ -35,6 +37,7 @@ class Job:
     grid: tuple[int, ...]
     steps: int
     z_per_step: bool
+    complete: bool = False
     sweep: str = ""
 
 

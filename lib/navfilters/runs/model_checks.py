@@ -54,7 +54,8 @@ def start(name: str, prior: Any, model: Any, dynamics: Any) -> Gaussian:
     cov = validation.covariance(f"{name}.cov", prior.cov, definite=False)
     validation.batch(**{f"{name}.mean": mean.shape[:-1], f"{name}.cov": cov.shape[:-2]})
     try:
-        moved = curved.retract(mean, np.zeros((*mean.shape[:-1], cov.shape[-1])))
+        with np.errstate(all="ignore"):
+            moved = curved.retract(mean, np.zeros((*mean.shape[:-1], cov.shape[-1])))
         validation.core("model.retract", moved, mean.shape[-1:])
     except (ValueError, IndexError) as error:
         raise ValueError(
@@ -111,25 +112,30 @@ def measurements(
         f"{name}.cov": prior.cov.shape[:-2],
         "z": z.shape[1:-1] if z_per_step else z.shape[:-1],
     }
-    if not hasattr(model, "R"):
+    first = at(model, 0)
+    if not hasattr(model, "R") or not (hasattr(first, "h") or hasattr(first, "given")):
         found = type(model).__name__
         raise ValueError(f"model must have R, and h with its derivatives; found {found}")
     R = validation.covariance("model.R", model.R, definite=False)
     shapes["model.R"] = R.shape[:-2]
-    first = at(model, 0)
     if not hasattr(first, "given"):
         if hasattr(first, "check"):
-            first.check(Gaussian(_first(prior.mean), _first(prior.cov, 2)), steps)
+            first.check(Gaussian(first_member(prior.mean), first_member(prior.cov, 2)), steps)
         _fits(z, prior, first, axes, name)
     return z, validation.batch(**shapes)
 
 
 def _fits(z, prior: Gaussian, model: MeasurementModel, axes: str, name: str) -> None:
     """Whether a measurement, and a state, are the model's."""
-    m = _size(model, prior)
+    m = measured_size(model, prior)
     if z.shape[-1] != m:
         raise ValueError(f"z must have shape ({axes}) with m = {m} as in model.R; found {z.shape}")
-    size = _state_size(model, prior.mean, m)
+    size = _statemeasured_size(model, prior.mean, m)
+    if size not in (None, prior.cov.shape[-1]) and hasattr(model, "retract"):
+        raise ValueError(
+            f"{name}.cov must have shape (..., {size}, {size}) for this model; found "
+            f"{prior.cov.shape}"
+        )
     if size not in (None, prior.cov.shape[-1]):
         raise ValueError(
             f"{name}.mean must have shape (..., {size}) for this model; found {prior.mean.shape}"
@@ -181,7 +187,7 @@ def sensor(model: MeasurementModel, prior: Gaussian, *, name: str = "prior") -> 
     ValueError
         A function whose value has another shape, or changes with the other members of the batch.
     """
-    m, n, mean = _size(model, prior), prior.cov.shape[-1], prior.mean
+    m, n, mean = measured_size(model, prior), prior.cov.shape[-1], prior.mean
     own = np.shape(model.R)[:-2]
     for part, core in (("h", (m,)), ("jacobian", (m, n)), ("hessian", (m, n, n))):
         function = getattr(model, part, None)
@@ -244,25 +250,25 @@ def dynamics(model: Any, prior: Gaussian) -> None:
         _alike("W of dynamics.propagate", part("propagate", 2, 3), mean, square, own, whole=False)
 
 
-def _size(model: MeasurementModel, prior: Gaussian) -> int:
+def measured_size(model: MeasurementModel, prior: Gaussian) -> int:
     """The number of components of a measurement."""
     if not hasattr(model, "noise"):
         return np.shape(model.R)[-1]
     with np.errstate(all="ignore"):
-        return np.shape(noise(model, _first(prior.mean)))[-1]
+        return np.shape(noise(model, first_member(prior.mean)))[-1]
 
 
-def _state_size(model: MeasurementModel, mean: np.ndarray, m: int) -> int | None:
+def _statemeasured_size(model: MeasurementModel, mean: np.ndarray, m: int) -> int | None:
     """The n of a jacobian (..., m, n), if it can be had: the state may be another model's."""
     try:
         with np.errstate(all="ignore"):
-            found = np.shape(model.jacobian(unwritable(_first(mean))))
+            found = np.shape(model.jacobian(unwritable(first_member(mean))))
     except Exception:  # whatever it is, the probe will find it again
         return None
     return found[-1] if found[-2:-1] == (m,) else None
 
 
-def _first(x: np.ndarray, core: int = 1) -> np.ndarray:
+def first_member(x: np.ndarray, core: int = 1) -> np.ndarray:
     """One member; of an empty batch, ones."""
     return x[(0,) * (x.ndim - core)] if x.size else np.ones(x.shape[-core:])
 
@@ -278,7 +284,7 @@ def _alike(
 ) -> None:
     """One state, several in front of the model's own batch axes, and, but for a Hessian, all."""
     options: dict[str, Any] = {"whole": whole, "finite": False}
-    one = _first(x)
+    one = first_member(x)
     count = 1 + sum(core) + one.size  # no other axis is as long
     near = 1 + 2.0**-10 * np.arange(count)
     several = (near[:, None] * one).reshape(count, *(1,) * len(own), -1)

@@ -86,6 +86,11 @@ class Problem:
         return prod(self.batch)
 
     @property
+    def complete(self) -> bool:
+        """Whether no measurement is NaN."""
+        return not any(np.isnan(leaf.array).any() for leaf in self.leaves if leaf.name == "z")
+
+    @property
     def axes(self) -> tuple[int | None, ...]:
         """Where each leaf has its members, once they are picked."""
         return tuple(leaf.axis for leaf in self.leaves)

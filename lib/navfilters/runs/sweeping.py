@@ -157,7 +157,9 @@ def sweep(
         for name, value in (("workers", workers), ("chunk", chunk))
     )
     problem = Problem.of(estimator, priors, z, model, dynamics, record, steps, z_per_step)
-    job = Job(engine, problem.tree, problem.axes, problem.grid, steps, z_per_step, uuid4().hex)
+    complete = problem.complete and not hasattr(model_checks.at(model, 0), "given")
+    shared = problem.tree, problem.axes, problem.grid, steps, z_per_step, complete
+    job = Job(engine, *shared, uuid4().hex)
     results = Results(_probe(job, problem), problem.count, steps)
     size = min(chunk, problem.count) if chunk else problem.size(steps, results.series_bytes)
     if engine == "jax":

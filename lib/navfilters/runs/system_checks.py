@@ -8,6 +8,7 @@ from navfilters.estimators.continuous import ContinuousSystem
 from navfilters.estimators.discrete import DiscreteSystem
 from navfilters.estimators.model_parts import at, by_error
 from navfilters.estimators.moments import unscented
+from navfilters.estimators.variants import bump_predicted, expect_at_mean, unchanged
 from navfilters.numerics.jacobians import ByComplexStep, around, examine
 from navfilters.types import Gaussian
 
@@ -65,8 +66,7 @@ def compare_derivatives(estimator: Any, model: Any, motion: Any, prior: Gaussian
     TypeError
         As of :func:`~navfilters.numerics.complex_step.complex_step`; names model.h or dynamics.f.
     """
-    moments = getattr(estimator, "moments", unscented)
-    if getattr(moments, "func", moments) is unscented:
+    if not _differentiates(estimator):
         return
     parts = [(at(model, 0), "h", "model.h", ("jacobian", "given"))]
     if motion is not None:
@@ -78,3 +78,11 @@ def compare_derivatives(estimator: Any, model: Any, motion: Any, prior: Gaussian
         with np.errstate(all="ignore"):
             for state in around(Gaussian(x, prior.cov)):
                 examine(ByComplexStep(function, 0, called), [(state,)])
+
+
+def _differentiates(estimator: Any) -> bool:
+    """Whether a filter's moments, or its variant, need a Jacobian."""
+    stages = [getattr(estimator, name, None) for name in ("moments", "variant")]
+    moments, variant = (getattr(stage, "func", stage) for stage in stages)
+    without = moments in (None, unscented)
+    return not (without and variant in (None, unchanged, bump_predicted, expect_at_mean))
