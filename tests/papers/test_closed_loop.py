@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from navfilters.estimators.multiplicative import MekfState
 from numpy.testing import assert_allclose, assert_array_equal
 from small_images import SMALL
 
-from navfilters.estimators.multiplicative import MekfState
 from navfilters.papers import pogorelsky2020
 from navfilters.papers.pogorelsky2020 import __main__ as command
 from navfilters.papers.pogorelsky2020.acquisition import acquire, measure_directly

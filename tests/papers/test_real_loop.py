@@ -13,11 +13,11 @@ from functools import partial
 import numpy as np
 import palsar_files as files
 import pytest
+from navfilters.estimators.multiplicative import MekfState
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.ndimage import map_coordinates
 
-from navfilters.estimators.multiplicative import MekfState
 from navfilters.papers import pogorelsky2020
 from navfilters.papers.pogorelsky2020 import CASES, NOMINAL, Setup, real_loop
 from navfilters.papers.pogorelsky2020 import __main__ as command
