@@ -1,7 +1,5 @@
 """Open-loop SAR navigation: a plain loop, both test cases within bands, and what may change."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +7,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from navfilters.papers.pogorelsky2020 import __main__ as command
 from navfilters.papers.pogorelsky2020.experiment import CASES, Setup
 from navfilters.papers.pogorelsky2020.final_nees import final_nees, nees_line
 from navfilters.papers.pogorelsky2020.noise_draws import misalignment, noise
@@ -173,23 +170,6 @@ def test_options_reach_the_filter():
         assert (other.errors[1:] != base.errors[1:]).any(), change
 
 
-def test_the_table_stands_beside_the_papers(capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "tqdm", None)  # as where it is not installed
-    command.main(["--case", "TC-2", "--runs", "2"])
-    out, err = capsys.readouterr()
-    assert out.startswith("TC-2, 2 runs, 1-sigma position at 600 s\n")
-    assert "138 m, 86.2 %" in out
-    assert "NEES" in out
-    assert "\r1/72" in err
-
-
-def test_the_module_runs_as_a_command():
-    command = [sys.executable, "-m", "navfilters.papers.pogorelsky2020", "--runs", "1"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert "--runs must be at least 2 and --seed at least 0; found 1, 0" in done.stderr
-
-
 REFUSED = {
     "case": (
         lambda: monte_carlo("TC-3"),
@@ -233,3 +213,12 @@ def test_nees_at_the_end_in_numbers_and_in_words(results):
     total = mean_nees(results["TC-1"].errors, results["TC-1"].covariances, runs_axis=1)
     assert_allclose(values.mean(), total.mean[-1])
     assert nees_line(np.array([1.0, 9.0, 9.0, 41.0])) == " 15.0 ± 15.1, median  9.0, 25.0 %"
+
+
+def test_a_flight_of_ones_own_is_flown():
+    setup = replace(Setup(), shortest=2)
+    own = truth(setup, 2)
+    plain = monte_carlo(setup, 2, 3)
+    assert_array_equal(monte_carlo(setup, 2, 3, flight=own).errors, plain.errors)
+    with pytest.raises(ValueError, match="flight must last 3 intervals, one an update; found 2"):
+        monte_carlo(setup, 3, 3, flight=own)
