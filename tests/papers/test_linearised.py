@@ -108,3 +108,28 @@ def test_the_filter_of_a_setup_is_a_bumped_ekf():
     none = monte_carlo(replace(setup, underweighted=0), 4, 3)
     assert_array_equal(none.errors, free.errors)
     assert_array_equal(none.S, free.S)
+
+
+@pytest.mark.parametrize("name", ["UKF", "mtSOF"])
+def test_other_moments_tend_to_the_ekf_where_errors_are_small(name):
+    """Estimates and covariances differ by the square of the errors' size; and both fly TC-1."""
+    flown = {}
+    for size in (1.0, 0.1):
+        sigma = {"sigma_r": 100.0 * size, "sigma_v": size, "sigma_mu": 0.01 * size}
+        setup = replace(CASES["TC-2"], **sigma, walk=False)
+        ekf, other = (
+            monte_carlo(setup, 3, 5, estimator=estimator) for estimator in (None, FILTERS[name])
+        )
+        unit = np.sqrt(np.diagonal(ekf.covariances, axis1=-2, axis2=-1))
+        flown[size] = [
+            np.abs((other.errors - ekf.errors) / unit).max(),
+            np.abs(
+                (other.covariances - ekf.covariances) / unit[..., None, :] / unit[..., None]
+            ).max(),
+        ]
+    assert (np.array(flown[0.1]) < 0.012 * np.array(flown[1.0])).all()
+    assert max(flown[1.0]) < 1e-2
+    far = monte_carlo("TC-1", 3, 5, estimator=FILTERS[name])
+    assert np.isfinite(far.errors).all()
+    assert (np.linalg.eigvalsh(far.covariances) > 0).all()
+    assert (far.errors != monte_carlo("TC-1", 3, 5).errors)[1:].all()
