@@ -111,7 +111,6 @@ FUNCTIONS = {
     ),
     "body_axes": (lambda x: frames.body_axes(x[..., :3], x[..., 3:]), orbit_state),
     "ellipsoid_intersection": (intersection, orbit_state),
-    "potential": (lambda r: GRAVITY.potential(r)[..., None], position),
     "acceleration": (GRAVITY.acceleration, position),
     "gradient": (GRAVITY.gradient, position),
     "Linear.h": (LINEAR.h, plane),
