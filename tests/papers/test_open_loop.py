@@ -36,6 +36,8 @@ def test_deviations_at_600_s(results, case, predicted, fell):
     assert_allclose(100 * (1 - spread.predicted[:2] / 1000), fell, atol=0.3)
     inside = (spread.low < spread.predicted) & (spread.predicted < spread.high)
     assert inside[:3].all()
+    assert_allclose(result.spread().sample[-1], spread.sample)
+    assert result.spread(0.5).low.shape == (73, 9)
     assert_allclose(result.times, np.arange(73) * 25 / 3)
     assert_array_equal(result.covariances, result.covariances.mT)
 
