@@ -72,12 +72,12 @@ class SimulatedImages:
         )
 
     def true_state(self, k: int) -> NavigationState:
-        """The state that the image after interval k is made at.
+        """The state at the start, or that the image after interval k is made at.
 
         Parameters
         ----------
         k : int
-            From 1.
+            From 0.
 
         Returns
         -------
