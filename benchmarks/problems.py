@@ -13,16 +13,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from navfilters import Gaussian, sweep
-from navfilters.estimators.extended import ExtendedKalman
-from navfilters.estimators.multiplicative import MekfState, mekf_update
+from navfilters import FILTERS, Gaussian, sweep
 from navfilters.numerics.runge_kutta import runge_kutta
 from navfilters.papers import pogorelsky2020, xiong2009
 from navfilters.papers.pogorelsky2020.experiment import NOMINAL
+from navfilters.space.earth_fixed_navigation import EarthFixedNavigation
 from navfilters.space.earth_fixed_orbit import EarthFixedOrbit
 from navfilters.space.frames import ellipsoid_intersection
 from navfilters.space.image_measurement import Measurement, SarGeometry
 from navfilters.space.inertial_orbit import Orbit
+from navfilters.space.navigation_state import NavigationState
 from navfilters.space.quaternions import from_rotation_vector, normalized, product, rotation_vector
 from navfilters.space.star_earth_sensor import StarEarthSensor
 from navfilters.types import Array
@@ -92,8 +92,7 @@ class Coasting:
 
     def ours(self, prior: Gaussian, z: Array, steps: int, engine: str) -> Gaussian:
         """This library, through its public function, checks of the input included."""
-        model = self, self.sensor
-        return swept(ExtendedKalman(), prior, z, model, steps, engine).estimate
+        return swept(prior, z, self.sensor, self, steps, engine)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,13 +126,6 @@ class Images:
     first: Gaussian
     z: Array
 
-    @property
-    def R(self) -> Array:
-        """Covariance of the noise of z, (5, 5), whose size a sweep asks for."""
-        R = np.zeros((5, 5))
-        R[:3, :3], R[3:, 3:] = self.geometry.D, self.geometry.R[2:, 2:]
-        return R
-
     def move(self, x: Array) -> Array:
         """The state an interval later, (..., 9)."""
         xp = x.__array_namespace__()
@@ -156,20 +148,16 @@ class Images:
         """
         xp = x.__array_namespace__()
         small = xp.concat([x[6:] / 2, xp.ones_like(x[:1])])
-        state = MekfState(x[:3], x[3:6], product(normalized(small), q), None)
+        state = NavigationState(x[:3], x[3:6], product(normalized(small), q))
         return self.geometry.h(state, z[:3])
 
-    def jacobian(self, x: Array, q: Array | None = None, z: Array | None = None) -> Array:
-        """H, (..., 4, 9); without q and z that of the nominal beam, whose size a sweep asks for."""
-        q = NOMINAL if q is None else q
-        state = MekfState(x[..., :3], x[..., 3:6], q, None)
-        r_f = self.pixel(x) if z is None else z[..., :3]
-        return self.geometry.jacobian(state, r_f)
+    def jacobian(self, x: Array, q: Array, z: Array) -> Array:
+        """H, (4, 9)."""
+        return self.geometry.jacobian(NavigationState(x[:3], x[3:6], q), z[:3])
 
     def noise(self, x: Array, q: Array, z: Array) -> Array:
         """R + B, (4, 4)."""
-        H_f = self.geometry.pixel_jacobian(MekfState(x[:3], x[3:6], q, None), z[:3])
-        return self.geometry.R + H_f @ self.geometry.D @ H_f.mT
+        return self.geometry.noise(NavigationState(x[:3], x[3:6], q), z[:3])
 
     def measured(self, z: Array) -> Array:
         """What h is compared with, (4,): the boresight meets the pixel."""
@@ -192,52 +180,19 @@ class Images:
         return ellipsoid_intersection(x[..., :3], self.geometry.boresight(NOMINAL))
 
     def ours(self, prior: Gaussian, z: Array, steps: int, engine: str) -> Gaussian:
-        """This library's own functions in a sweep, checks of the input included."""
-        model = self.orbit, self
-        return swept(Multiplicative(self.steps), prior, z, model, steps, engine).estimate
+        """This library, through its public function, checks of the input included."""
+        x, dynamics = prior.mean, EarthFixedNavigation(self.orbit, self.steps)
+        whole = np.concatenate([x[..., :6], from_rotation_vector(x[..., 6:])], axis=-1)
+        found = swept(prior._replace(mean=whole), z, self.geometry, dynamics, steps, engine)
+        x = found.mean
+        mean = np.concatenate([x[..., :6], rotation_vector(x[..., 6:])], axis=-1)
+        return found._replace(mean=mean)
 
 
-class Navigation(MekfState):
-    """The library's state of the multiplicative EKF, as a sweep wants it."""
-
-    @property
-    def estimate(self) -> Gaussian:
-        """Mean (..., 9), the misalignment as a rotation vector, and covariance."""
-        xp = self.r.__array_namespace__()
-        mean = xp.concat([self.r, self.v, rotation_vector(self.q_mu)], axis=-1)
-        return Gaussian(mean, self.P)
-
-
-@dataclass(frozen=True)
-class Multiplicative:
-    """The library's multiplicative EKF as a filter with a memory.
-
-    Parameters
-    ----------
-    steps : int
-        Of an interval.
-    """
-
-    steps: int
-
-    def init(self, prior: Gaussian) -> Navigation:
-        """The state before any image; mean (..., 9), cov (..., 9, 9)."""
-        x = prior.mean
-        return Navigation(x[..., :3], x[..., 3:6], from_rotation_vector(x[..., 6:]), prior.cov)
-
-    def step(self, state: Navigation, z: Array, orbit: EarthFixedOrbit, images: Images):
-        """One interval and one image; z (..., 5)."""
-        xp = z.__array_namespace__()
-        x, P = orbit.propagate(xp.concat([state.r, state.v], axis=-1), state.P, self.steps)
-        state = MekfState(x[..., :3], x[..., 3:], state.q_mu, P)
-        image = Measurement(z[..., :3], z[..., 3], z[..., 4])
-        return Navigation(*mekf_update(state, image, images.geometry).state)
-
-
-def swept(estimator, prior, z, model, steps, engine):
-    """The last state of a sweep on one core."""
+def swept(prior, z, sensor, dynamics, steps, engine):
+    """The last estimate of the EKF in a sweep on one core."""
     options = {"engine": engine, "z_per_step": True, "workers": 1, "progress": False}
-    return sweep(estimator, prior, z[:steps], model, steps, **options).final
+    return sweep(FILTERS["EKF"], prior, z[:steps], sensor, dynamics=dynamics, **options).final
 
 
 def priors(problem: Coasting | Images, members: int) -> Gaussian:
@@ -272,8 +227,7 @@ def images() -> Images:
     pixel = problem.pixel(x)
     slant_range = np.linalg.norm(pixel - x[:, :3], axis=-1)
     speed = np.linalg.norm(x[:, 3:], axis=-1)
-    z = np.concatenate([pixel, slant_range[:, None], speed[:, None]], axis=-1)
-    return replace(problem, z=z)
+    return replace(problem, z=Measurement(pixel, slant_range, speed).z)
 
 
 def in_deviations(got: Gaussian, wanted: Gaussian) -> Array:

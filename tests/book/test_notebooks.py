@@ -1,11 +1,16 @@
 """The stored notebooks: executed once from top to bottom, and free of what only one machine has."""
 
+import ast
+import importlib
 import json
 import re
+from collections import defaultdict
 
 import nbformat
 import pytest
 from browser import ROOT, toc
+
+import navfilters
 
 PATHS = sorted((ROOT / "book").rglob("*.ipynb"))
 CHAPTERS = [p for p in PATHS if p.parent.name in ("foundations", "range-bearing")]
@@ -17,6 +22,19 @@ METADATA = {
 LOCAL = re.compile(
     r"(?<!\w)/(home|Users|root|tmp|work|opt)/\w|\b[A-Z]:\\|\bat 0x[0-9a-f]+|\d{4}-\d\d-\d\dT\d\d:"
 )
+
+# What chapters owe until they are next rewritten. Nothing may be added to any of the three.
+LONG = {"orbit-manoeuvre/robust-filters"}
+TWICE = {"departure", "deviations", "digits", "flown", "squared_deviations", "sweep"}
+SHADOWED = {
+    ("foundations/extended-kalman-filter", "run"),
+    ("orbit-manoeuvre/limits", "noise"),
+    ("orbit-manoeuvre/robust-filters", "truth"),
+    ("orbit-manoeuvre/robust-filters", "unscented"),
+    ("range-bearing/close-estimates", "sweep"),
+    ("range-bearing/sensitivity", "sweep"),
+}
+MODULES = {"navfilters.estimators", "navfilters.numerics"}  # whose packages export nothing yet
 
 
 def label(path):
@@ -99,3 +117,64 @@ def test_it_ends_with_exercises_and_their_hidden_solutions(path):
         solutions += cell.cell_type == "code" and "hide-cell" in cell.metadata.get("tags", ())
     assert section.startswith("Exercises")
     assert solutions >= 2
+
+
+# --- as programs --------------------------------------------------------------------------------
+
+
+def syntax(path):
+    """A chapter's code, one tree a cell."""
+    return [ast.parse(cell.source) for cell in code_cells(path)]
+
+
+def bound(path):
+    """Every name that a chapter binds by itself, also as an argument or inside of a function."""
+    for node in (node for tree in syntax(path) for node in ast.walk(tree)):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            yield node.name
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.id
+        elif isinstance(node, ast.arg):
+            yield node.arg
+
+
+def imported(path):
+    """Modules of the library from which a chapter imports names, and the names."""
+    for node in (node for tree in syntax(path) for node in ast.walk(tree)):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("navfilters"):
+            yield node.module, [alias.name for alias in node.names]
+        elif isinstance(node, ast.Import):
+            yield from ((alias.name, []) for alias in node.names if "navfilters" in alias.name)
+
+
+@every_notebook
+def test_it_has_few_cells_that_show_something(path):
+    shown = [cell for cell in code_cells(path) if cell.outputs]
+    assert len(shown) <= 24 or label(path) in LONG
+
+
+def test_no_function_is_defined_in_two_chapters():
+    where = defaultdict(set)
+    for path in PATHS:
+        for node in (node for tree in syntax(path) for node in tree.body):
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                where[node.name].add(label(path))
+    assert {name for name, pages in where.items() if len(pages) > 1} <= TWICE
+
+
+@every_notebook
+def test_it_binds_no_name_of_the_library(path):
+    """Neither of the package itself, nor of those from which the chapter imports names."""
+    taken = set(navfilters.__all__)
+    for module, _ in imported(path):
+        if module != "navfilters.book":  # plotting and claims, which keep their names to themselves
+            taken |= set(getattr(importlib.import_module(module), "__all__", ()))
+    assert {(label(path), name) for name in bound(path) if name in taken} <= SHADOWED
+
+
+@every_notebook
+def test_it_imports_from_packages_only(path):
+    """A page shows the public names and not where they are kept."""
+    for module, names in imported(path):
+        package = hasattr(importlib.import_module(module), "__path__")
+        assert package or module.rpartition(".")[0] in MODULES, (module, names)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from navfilters.estimators.multiplicative import MekfState
 from numpy.testing import assert_allclose, assert_array_equal
 
 from navfilters.models import Linear, RangeBearing
@@ -13,6 +12,7 @@ from navfilters.space.earth_fixed_orbit import EarthFixedOrbit
 from navfilters.space.gravity import Gravity
 from navfilters.space.image_measurement import Measurement, SarGeometry
 from navfilters.space.inertial_orbit import Orbit
+from navfilters.space.navigation_state import NavigationState
 from navfilters.space.osculating_ellipse import perigee_apogee
 from navfilters.space.star_earth_sensor import StarEarthSensor
 from navfilters.space.thrust import Thrust
@@ -72,16 +72,17 @@ PIXEL = np.array([6.0e6, 1.5e6, 1.2e6])
 def radar(method):
     def of(x):
         q = quaternions.from_rotation_vector(x[..., 6:9])
-        return method(MekfState(x[..., :3], x[..., 3:6], q, None), x[..., 9:])
+        return method(NavigationState(x[..., :3], x[..., 3:6], q), x[..., 9:])
 
     return of
 
 
 def residual(state, r_f):
     """Of a measurement that is what it is, whatever the state: no derivative in r_f."""
-    distance = np.linalg.norm(PIXEL)
-    pixel = np.broadcast_to(PIXEL, r_f.shape)
-    return RADAR.linearize(state, Measurement(pixel, distance, distance))[0]
+    pixel, distance = np.broadcast_to(PIXEL, r_f.shape), np.linalg.norm(PIXEL)
+    size = np.broadcast_to(distance, r_f.shape[:-1])
+    y, sensor = RADAR.given(Measurement(pixel, size, size).z)
+    return y - sensor.h(state.x)
 
 
 def intersection(x):
@@ -110,7 +111,6 @@ FUNCTIONS = {
     ),
     "body_axes": (lambda x: frames.body_axes(x[..., :3], x[..., 3:]), orbit_state),
     "ellipsoid_intersection": (intersection, orbit_state),
-    "potential": (lambda r: GRAVITY.potential(r)[..., None], position),
     "acceleration": (GRAVITY.acceleration, position),
     "gradient": (GRAVITY.gradient, position),
     "Linear.h": (LINEAR.h, plane),
@@ -132,7 +132,8 @@ FUNCTIONS = {
     "SarGeometry.h": (radar(RADAR.h), seen),
     "SarGeometry.jacobian": (radar(RADAR.jacobian), seen),
     "SarGeometry.pixel_jacobian": (radar(RADAR.pixel_jacobian), seen),
-    "SarGeometry.linearize": (radar(residual), seen),
+    "SarGeometry.noise": (radar(RADAR.noise), seen),
+    "Pixel.h": (radar(residual), seen),
     "SarGeometry.boresight": (
         lambda x: RADAR.boresight(quaternions.from_rotation_vector(x)),
         vector,

@@ -4,12 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from navfilters.estimators.multiplicative import MekfState
 from numpy.testing import assert_allclose, assert_array_equal
 from small_images import SMALL
 
 from navfilters.papers import pogorelsky2020
-from navfilters.papers.pogorelsky2020 import __main__ as command
 from navfilters.papers.pogorelsky2020.acquisition import acquire, measure_directly
 from navfilters.papers.pogorelsky2020.closed_loop import Images, monte_carlo_closed
 from navfilters.papers.pogorelsky2020.experiment import CASES, Setup
@@ -20,6 +18,7 @@ from navfilters.papers.pogorelsky2020.open_loop import monte_carlo
 from navfilters.papers.pogorelsky2020.true_flight import truth
 from navfilters.sar.matching.matcher import Matcher
 from navfilters.space.image_measurement import Measurement
+from navfilters.space.navigation_state import NavigationState
 
 pytestmark = pytest.mark.slow
 
@@ -34,9 +33,7 @@ def predicted(k, speeds):
     x = truth(Setup(), k).x[k]
     v = x[3:] / np.linalg.norm(x[3:]) * np.asarray(speeds)[:, None]
     n = len(v)
-    return MekfState(
-        np.tile(x[:3], (n, 1)), v, np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)), np.zeros((n, 9, 9))
-    )
+    return NavigationState(np.tile(x[:3], (n, 1)), v, np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)))
 
 
 def test_shapes(closed):
@@ -145,17 +142,6 @@ def test_predicted_geometry_is_the_nominal_one_at_the_truth():
 def test_refusals(call, message):
     with pytest.raises(ValueError, match=message):
         call()
-
-
-def test_table_of_the_command(monkeypatch, capsys):
-    monkeypatch.setattr(
-        command, "closed_table", lambda case, runs, seed, progress: f"{case} {runs} {seed}"
-    )
-    command.main(["--closed-loop", "--case", "TC-2", "--runs", "7"])
-    assert capsys.readouterr().out == "TC-2, 7 runs, 1-sigma position at 25 s\nTC-2 7 0\n"
-    with pytest.raises(SystemExit):
-        command.main(["--closed-loop", "--runs", "1"])
-    capsys.readouterr()
 
 
 def test_printed_table():

@@ -153,3 +153,38 @@ def test_arrows_of_a_diagram_run_level_or_upright_from_edge_to_edge(ax):
     wanted = [((0.55, 0), (2.45, 0)), ((2.45, -0.1), (0.55, -0.1)), ((3.2, 1.68), (3.2, 0.32))]
     assert_allclose(spans, wanted, atol=1e-12)
     assert {"a", "b", "c", "go", "back"} <= {t.get_text() for t in ax.texts}
+
+
+def test_nine_errors_of_runs_and_their_deviations():
+    """Rows are position, velocity and misalignment; three deviations to each side; degrees."""
+    times, rng = np.array([0.0, 10.0, 20.0]), np.random.default_rng(0)
+    errors = rng.normal(size=(3, 5, 9))
+    predicted, sample = np.full((3, 9), 2.0), np.full((3, 9), 1.0)
+    both = {"predicted": predicted, "sample": sample}
+    figure = plotting.nine_errors(times, errors, errors.mean(axis=1), both, (10, 20, 30))
+    axes = figure.axes
+    assert len(axes) == 9
+    assert [ax.get_ylim()[1] for ax in axes[::3]] == [10, 20, 30]
+    for i, scale in ((1, 1.0), (5, 1.0), (8, np.rad2deg(1.0))):
+        lines = axes[i].get_lines()
+        assert len(lines) == 5 + 1 + 4  # runs, mean, both deviations to each side
+        assert_allclose(lines[2].get_ydata(), scale * errors[:, 2, i])
+        assert_allclose(
+            [line.get_ydata()[0] for line in lines[6:]], scale * np.array([6, -6, 3, -3])
+        )
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["mean", *both]
+    plt.close(figure)
+
+
+def test_tails_of_the_nees():
+    values = {"one": np.array([3.0, 1.0, 2.0, 40.0]), "two": np.array([5.0])}
+    figure = plotting.nees_tails(
+        values, {"one": {"color": "red"}, "two": {"linestyle": "--"}}, dof=2
+    )
+    chi_square, one, two, bound = figure.axes[0].get_lines()
+    assert_allclose(chi_square.get_ydata(), np.exp(-chi_square.get_xdata() / 2))
+    assert_allclose(one.get_xdata(), [1, 2, 3, 40])
+    assert_allclose(one.get_ydata(), [1, 0.75, 0.5, 0.25])
+    assert (one.get_color(), two.get_linestyle()) == ("red", "--")
+    assert_allclose(bound.get_xdata(), -2 * np.log(0.01))
+    plt.close(figure)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from discrete_systems import ekf as discrete
 from discrete_systems import predict, update
-from navfilters.estimators.multiplicative import MekfState, mekf_update
 from wrong_models import ALONE, PRIORS, RIGHT, WRONG, Model, Z
 
 from navfilters import FILTERS, Filter, Gaussian, SigmaPoints, run, sweep
@@ -20,7 +19,6 @@ from navfilters.estimators.continuous import (
 from navfilters.estimators.continuous import extended_kalman_bucy as continuous
 from navfilters.estimators.discrete import DiscreteSystem
 from navfilters.estimators.robust import AdaptiveRobust, Robust
-from navfilters.space.quaternions import normalized
 
 PRIORS3 = Gaussian(PRIORS.mean, np.stack([PRIORS.cov] * 3))
 TWO = SigmaPoints(alpha=[0.5, 1.0])
@@ -255,46 +253,3 @@ def test_continuous_systems_name_the_function(wrong):
     ):
         with pytest.raises(ValueError, match=rf"system\.{wrong.split(':')[0]} must"):
             go(ALONE, lambda t: [0.0], [0.0, 1.0])
-
-
-# --- the multiplicative filter ------------------------------------------------------------------
-
-STATE = MekfState(np.ones(3), np.ones(3), normalized(np.ones(4)), np.eye(9))
-
-
-class Seen:
-    """Four components of nine."""
-
-    def __init__(self, H=np.eye(4, 9), R=np.eye(4)):
-        self.H, self.R = H, R
-
-    def linearize(self, state, measurement):
-        return np.zeros(4), self.H, self.R
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"state": STATE._replace(P=np.eye(6))}, r"state.P must have shape \(..., 9, 9\)"),
-        ({"state": STATE._replace(r=np.ones(1))}, r"state.r must have shape \(..., 3\)"),
-        ({"state": STATE._replace(q_mu=np.ones(3))}, r"state.q_mu must have shape \(..., 4\)"),
-        (
-            {"state": STATE._replace(v=np.ma.masked_less(np.ones(3), 2))},
-            "state.v must have no mask",
-        ),
-        ({"model": Seen(H=np.eye(4, 10))}, r"H of model.linearize must have shape \(..., 4, 9\)"),
-        ({"model": Seen(H=np.ones((1, 9)))}, r"H of model.linearize must have shape"),
-        ({"model": Seen(R=np.ones(4))}, r"R of model.linearize must have shape \(..., 4, 4\)"),
-        ({"model": Seen(R=0.1)}, r"R of model.linearize must have shape \(..., 4, 4\)"),
-        ({"underweighting": -0.1}, "underweighting must be at least 0; found -0.1"),
-        ({"underweighting": [0.5, np.nan]}, "underweighting must be.*nan"),
-        ({"underweighting": True}, "underweighting must be.*bool"),
-        ({"gamma": -1.0}, "gamma must be a length in m of at least 0; found -1.0"),
-        ({"gamma": True}, "gamma must be a length"),
-    ],
-)
-def test_the_multiplicative_update_names_what_is_wrong(changes, message):
-    arguments = {"state": STATE, "measurement": None, "model": Seen()}
-    mekf_update(**arguments, underweighting=np.float32(0.5), gamma=np.array(1))
-    with pytest.raises(ValueError, match=message):
-        mekf_update(**arguments | changes)

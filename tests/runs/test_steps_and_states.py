@@ -1,23 +1,18 @@
-"""What depends on the number of the step, and a state that is no Gaussian: as in a direct loop."""
+"""What depends on the number of the step: as in a direct loop."""
 
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import naive
 import numpy as np
 import pytest
 from naive import covariances
-from navfilters.estimators.multiplicative import MekfState, mekf_update
 from numpy.testing import assert_allclose
 
 from navfilters import FILTERS, Filter, Gaussian, SweepError, run, sweep
 from navfilters.estimators.robust import AdaptiveRobust
 from navfilters.models import Linear
 from navfilters.runs import records
-from navfilters.space.frames import body_axes, ellipsoid_intersection, enu_covariance
-from navfilters.space.image_measurement import Measurement, SarGeometry
-from navfilters.space.quaternions import from_rotation_vector, rotation_vector
 
 engines = pytest.mark.parametrize("engine", ["numpy", pytest.param("jax", marks=pytest.mark.slow)])
 quiet = partial(sweep, progress=False)
@@ -166,101 +161,3 @@ def test_an_exception_at_a_step_names_the_configuration():
     with pytest.raises(SweepError, match="configuration 3: ZeroDivisionError: third step"):
         quiet(Breaks(), prior, [0.3], sensor, 3)
     quiet(Breaks(), prior, [0.3], sensor, 2)
-
-
-# --- a state with a quaternion ------------------------------------------------------------------
-
-R0 = np.array([-1108465.150, -6100044.949, 3397134.666])
-V0 = np.array([-1003.9419331, 3801.3289491, 6498.2536689])
-SIGMA = np.array([300.0] * 3 + [3.0] * 3 + [np.deg2rad(0.05)] * 3)
-GEOMETRY = SarGeometry(
-    np.deg2rad(34.3),
-    0.0,
-    np.diag([0.0, 0.0, 1.0, 0.54**2]),
-    enu_covariance((2.0, 8.0, 1.0), 29.76, -95.37),
-    body_axes(R0, V0),
-)
-
-
-def mekf_state(x, P):
-    """From nine components, the last three the misalignment's rotation vector."""
-    return MekfState(x[..., :3], x[..., 3:6], from_rotation_vector(x[..., 6:]), P)
-
-
-class Flown(NamedTuple):
-    """What goes from step to step; its estimate is what a sweep reports."""
-
-    mekf: MekfState
-
-    @property
-    def estimate(self):
-        r, v, q_mu, P = self.mekf
-        xp = r.__array_namespace__()
-        return Gaussian(xp.concat([r, v, rotation_vector(q_mu)], axis=-1), P)
-
-
-@dataclass(frozen=True)
-class ImageFilter:
-    """The multiplicative EKF on images of one place, underweighted in the first steps."""
-
-    underweighted: int
-
-    def init(self, prior):
-        return Flown(mekf_state(*prior))
-
-    def step(self, state, z, images, dynamics, k):
-        measurement = Measurement(images.pixels[k], z[..., 2], z[..., 3])
-        beta = 0.5 * (k < self.underweighted)
-        update = mekf_update(state.mekf, measurement, images.geometry, underweighting=beta)
-        return Flown(update.state)
-
-
-@dataclass(frozen=True, eq=False)
-class Images:
-    """One place on the ground for each step, (steps, 3)."""
-
-    geometry: SarGeometry
-    pixels: np.ndarray
-
-    @property
-    def R(self):
-        return self.geometry.R
-
-    def jacobian(self, x):
-        return self.geometry.jacobian(mekf_state(x, None), self.pixels[0])
-
-
-@engines
-def test_the_multiplicative_filter_is_swept_as_one_with_a_memory(engine):
-    rng, steps, count = np.random.default_rng(1), 4, 5
-    truth = np.concatenate([R0, V0, np.zeros(3)])
-    prior = Gaussian(truth + SIGMA * rng.normal(size=(count, 9)), np.diag(SIGMA**2))
-    axis = GEOMETRY.boresight(np.array([0.0, 0.0, 0.0, 1.0]))
-    pixels = ellipsoid_intersection(R0, axis) + 5 * rng.normal(size=(steps, 3))
-    z = np.zeros((steps, count, 4))
-    z[..., 2] = np.linalg.norm(pixels - R0, axis=-1)[:, None] + rng.normal(size=(steps, count))
-    z[..., 3] = np.linalg.norm(V0) + 0.54 * rng.normal(size=(steps, count))
-    got = quiet(
-        ImageFilter(2),
-        prior,
-        z,
-        Images(GEOMETRY, pixels),
-        steps,
-        z_per_step=True,
-        engine=engine,
-        record=records.Distance(R0),
-        chunk=2,
-    )
-    state = mekf_state(prior.mean, np.broadcast_to(prior.cov, (count, 9, 9)))
-    errors = [np.linalg.norm(state.r - R0, axis=-1)]
-    for k in range(steps):
-        seen = Measurement(pixels[k], z[k, :, 2], z[k, :, 3])
-        state = mekf_update(state, seen, GEOMETRY, underweighting=0.5 if k < 2 else 0.0).state
-        errors.append(np.linalg.norm(state.r - R0, axis=-1))
-    assert_allclose(got.record, np.stack(errors), rtol=0, atol=1e-6)
-    for ours, theirs in zip(got.state.mekf[:3], state[:3], strict=True):
-        assert_allclose(ours, theirs, rtol=0, atol=1e-12 * np.abs(theirs).max())
-    deviation = np.sqrt(np.diagonal(state.P, axis1=-2, axis2=-1))
-    scale = deviation[:, :, None] * deviation[:, None, :]
-    assert_allclose(got.state.mekf.P / scale, state.P / scale, rtol=0, atol=1e-9)
-    assert (deviation < SIGMA).all()  # the images did tell something

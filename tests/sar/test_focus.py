@@ -21,7 +21,15 @@ from navfilters.sar.raw.observation import centred_window
 from navfilters.sar.raw.radar import PALSAR, Radar, Raw, receive
 from navfilters.space.frames import east_north_up, ecef_to_geodetic, ellipsoid_intersection
 
-LONG = Radar(wavelength=0.059, flat_beam=True)  # the pulse of PALSAR, a quarter of its aperture
+
+class FlatBeam(Radar):
+    """An antenna that is uniform over the illuminated angle, as the theory of resolution has it."""
+
+    def pattern(self, sine):
+        return np.where(super().pattern(sine) > 0, 1.0, 0.0)
+
+
+LONG = FlatBeam(wavelength=0.059)  # the pulse of PALSAR, a quarter of its aperture
 
 
 def hyperbola(V, *, R_0=866e3, at=0.0, seen=(-0.42, 0.42), pulses=2048, ranges=200, radar=None):
@@ -428,7 +436,7 @@ def test_sizes_and_centre():
     image = Focuser(raw, lines=100, samples=50).image(7182.0)
     assert image.pixels.shape == (100, 50)
     assert image.pixels.dtype == np.complex64
-    assert_allclose(image.centre_time, 0.0, atol=1e-12)
+    assert_allclose(image.first_time, -50 / raw.prf, atol=1e-12)
     assert_allclose(image.centre_range, raw.near_range + 25 * c / 64e6)
     assert Focuser(raw).image(7182.0).pixels.shape == (2048, 200 - 128)
 

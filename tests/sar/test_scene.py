@@ -135,8 +135,8 @@ def test_land_cover_has_all_classes_and_a_seed():
     for kind in COVER.values():
         assert (np.abs(level - kind.level) < 1.0).mean() > 0.01
     assert_allclose(cover.at(0.0 * np.ones(1), np.zeros(1)), cover.reflectivity[250, 250])
-    with pytest.raises(ValueError, match="patch must be a positive number"):
-        LandCover.draw(100.0, 0, patch=0.0)
+    with pytest.raises(ValueError, match="half_width must be a positive number"):
+        LandCover.draw(0.0, 0)
 
 
 def test_lambert():

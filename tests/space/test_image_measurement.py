@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from navfilters.estimators.multiplicative import MekfState
 from navfilters.space.frames import antenna_axes, body_axes, ellipsoid_intersection, enu_covariance
 from navfilters.space.image_measurement import Measurement, SarGeometry
-from navfilters.space.quaternions import cross_matrix, from_rotation_vector, matrix, product
+from navfilters.space.image_sensor import SarPass
+from navfilters.space.navigation_state import NavigationState
+from navfilters.space.pose import retract
+from navfilters.space.quaternions import cross_matrix, from_rotation_vector, matrix
 
 R0 = np.array([-1108465.150, -6100044.949, 3397134.666])
 V0 = np.array([-1003.9419331, 3801.3289491, 6498.2536689])
@@ -33,20 +35,20 @@ def states(count=6, size=1.0):
     error = size * SIZE * rng.normal(size=(count, 9))
     q = from_rotation_vector(rng.normal(size=(count, 3)) * 2e-3)
     pixel = ellipsoid_intersection(R0, GEOMETRY.boresight(q))
-    estimate = MekfState(
-        R0 + error[:, :3], V0 + error[:, 3:6], product(from_rotation_vector(error[:, 6:]), q), None
-    )
-    return estimate, pixel
+    truth = NavigationState(R0, V0, q)
+    return NavigationState.of(retract(truth.x, error)), pixel
 
 
 def moved(state, error):
     """The state whose error with respect to the given one is this."""
-    return MekfState(
-        state.r + error[..., :3],
-        state.v + error[..., 3:6],
-        product(from_rotation_vector(error[..., 6:]), state.q_mu),
-        None,
-    )
+    return NavigationState.of(retract(state.x, error))
+
+
+def told(geometry, state, measurement):
+    """Residual, H and noise, as a filter asks for them."""
+    y, sensor = geometry.given(measurement.z)
+    x = state.x
+    return y - sensor.h(x), sensor.jacobian(x), sensor.noise(x)
 
 
 def differences(f, n, step):
@@ -75,9 +77,9 @@ def test_the_true_state_sees_what_is_measured(look, squint):
     q = from_rotation_vector(np.array([[0.0, 0, 0], [1e-3, -2e-3, 3e-3]]))
     pixel = ellipsoid_intersection(R0, geometry.boresight(q))
     slant_range = np.linalg.norm(pixel - R0, axis=-1)
-    truth = MekfState(R0, V0, q, None)
+    truth = NavigationState(R0, V0, q)
     measured = Measurement(pixel, slant_range, np.full(2, np.linalg.norm(V0)))
-    residual, _, _ = geometry.linearize(truth, measured)
+    residual, _, _ = told(geometry, truth, measured)
     assert_allclose(residual / UNIT, 0, atol=1e-11)
     east = np.array([-R0[1], R0[0], 0.0]) @ (pixel[0] - R0)
     assert (east < 0) == (look < 0)  # northwards, the right side is east
@@ -101,7 +103,7 @@ def test_jacobians_by_jax():
     estimate, pixel = states()
 
     def of_all(small, r, v, q, r_f):
-        state = moved(MekfState(r, v, q, None), small[:9])
+        state = moved(NavigationState(r, v, q), small[:9])
         return GEOMETRY.h(state, r_f + small[9:])
 
     small = jnp.full(12, 1e-30)  # at zero itself the length of the rotation has no derivative
@@ -137,7 +139,7 @@ def test_jacobians_are_equations_20_to_30_and_their_slips():
 def test_pixel_covariance_is_equation_29():
     estimate, pixel = states()
     zero = np.zeros(6)
-    _, H, total = GEOMETRY.linearize(estimate, Measurement(pixel, zero, zero))
+    _, H, total = told(GEOMETRY, estimate, Measurement(pixel, zero, zero))
     H_f = GEOMETRY.pixel_jacobian(estimate, pixel)
     for i in range(6):
         assert_allclose(total[i], R + H_f[i] @ D @ H_f[i].T, rtol=1e-9, atol=1e-24)
@@ -147,14 +149,14 @@ def test_pixel_covariance_is_equation_29():
 def test_pixel_covariance_is_that_of_the_residuals():
     """20 000 pixels in error, seen by the true state."""
     rng = np.random.default_rng(1)
-    truth = MekfState(R0, V0, np.array([0.0, 0, 0, 1]), None)
+    truth = NavigationState(R0, V0, np.array([0.0, 0, 0, 1]))
     hit = ellipsoid_intersection(R0, GEOMETRY.boresight(truth.q_mu))
     n = 20000
     pixel = hit + rng.multivariate_normal(np.zeros(3), D, n)
     ranges = np.linalg.norm(hit - R0) + rng.normal(size=n)
     speeds = np.linalg.norm(V0) + 0.54 * rng.normal(size=n)
-    residual, _, _ = GEOMETRY.linearize(truth, Measurement(pixel, ranges, speeds))
-    _, _, total = GEOMETRY.linearize(truth, Measurement(hit, np.array(0.0), np.array(0.0)))
+    residual, _, _ = told(GEOMETRY, truth, Measurement(pixel, ranges, speeds))
+    _, _, total = told(GEOMETRY, truth, Measurement(hit, np.array(0.0), np.array(0.0)))
     deviation = np.sqrt(np.diag(total))
     assert_allclose(
         np.cov(residual.T) / deviation / deviation[:, None],
@@ -180,12 +182,12 @@ def test_batch_axes_come_first_and_members_do_not_meet(batch):
         np.resize(a, (*batch, a.shape[-1])) if count else np.zeros((0, a.shape[-1]))
         for a in (*estimate[:3], pixel)
     )
-    state, seen = MekfState(r, v, q, None), np.ones(batch)
-    whole = GEOMETRY.linearize(state, Measurement(pixel, seen, seen))
+    state, seen = NavigationState(r, v, q), np.ones(batch)
+    whole = told(GEOMETRY, state, Measurement(pixel, seen, seen))
     assert whole[1].shape == (*batch, 4, 9)
     for i in np.ndindex(batch):
-        one = MekfState(r[i], v[i], q[i], None)
-        alone = GEOMETRY.linearize(one, Measurement(pixel[i], seen[i], seen[i]))
+        one = NavigationState(r[i], v[i], q[i])
+        alone = told(GEOMETRY, one, Measurement(pixel[i], seen[i], seen[i]))
         for got, wanted in zip(whole, alone, strict=True):
             assert_array_equal(got[i], wanted)
 
@@ -193,7 +195,7 @@ def test_batch_axes_come_first_and_members_do_not_meet(batch):
 def test_attitude_and_state_may_have_other_batch_axes_than_the_pixel():
     estimate, pixel = states(3)
     many = replace(GEOMETRY, T_e_b=np.stack([GEOMETRY.T_e_b] * 2)[:, None])
-    state = MekfState(estimate.r[0], estimate.v[0], estimate.q_mu[0], None)
+    state = NavigationState(estimate.r[0], estimate.v[0], estimate.q_mu[0])
     got = many.jacobian(state, pixel)
     assert got.shape == (2, 3, 4, 9)
     assert_array_equal(got[1, 2], GEOMETRY.jacobian(state, pixel[2]))
@@ -202,12 +204,45 @@ def test_attitude_and_state_may_have_other_batch_axes_than_the_pixel():
 
 def test_a_pixel_that_was_not_found_is_nan_alone():
     estimate, pixel = states(3)
-    wanted = GEOMETRY.linearize(estimate, Measurement(pixel, np.ones(3), np.ones(3)))
+    wanted = told(GEOMETRY, estimate, Measurement(pixel, np.ones(3), np.ones(3)))
     pixel = np.where(np.array([False, True, False])[:, None], np.nan, pixel)
-    got = GEOMETRY.linearize(estimate, Measurement(pixel, np.ones(3), np.ones(3)))
+    got = told(GEOMETRY, estimate, Measurement(pixel, np.ones(3), np.ones(3)))
     for a, b in zip(got, wanted, strict=True):
         assert np.isnan(a[1]).any()
         assert_array_equal(a[[0, 2]], b[[0, 2]])
+
+
+@pytest.mark.parametrize("batch", [(), (2, 3)])
+def test_parts_and_whole_of_a_measurement_and_of_a_state(batch):
+    rng = np.random.default_rng(0)
+    z, x = rng.normal(size=(*batch, 5)), rng.normal(size=(*batch, 10))
+    seen, state = Measurement.of(z), NavigationState.of(x)
+    assert (seen.slant_range.shape, state.q_mu.shape) == (batch, (*batch, 4))
+    assert_array_equal(seen.z, z)
+    assert_array_equal(state.x, x)
+    one = NavigationState(R0, V0, state.q_mu)  # of which all members share a part
+    assert_array_equal(one.x[..., :3], np.broadcast_to(R0, (*batch, 3)))
+
+
+def test_what_is_compared_with_the_expected_measurement():
+    """Ratios of zero, range and speed; nothing of an image of which anything is missing."""
+    z = np.arange(1.0, 31.0).reshape(6, 5)
+    z[np.arange(5), np.arange(5)] = np.nan
+    y, sensor = GEOMETRY.given(z)
+    assert np.isnan(y[:5]).all()
+    assert_array_equal(y[5], [0, 0, 29, 30])
+    assert_array_equal(sensor.r_f, z[:, :3])
+    assert_array_equal(sensor.R, R)
+
+
+def test_a_pass_has_the_attitude_of_each_image():
+    turned = body_axes(np.array([R0, R0]), np.array([V0, V0 + 100.0]))
+    images, (estimate, pixel) = SarPass(GEOMETRY, turned), states(2)
+    for k in range(2):
+        assert_array_equal(images.at(k).T_e_b, turned[k])
+        one = replace(GEOMETRY, T_e_b=turned[k])
+        assert_array_equal(images.at(k).h(estimate, pixel), one.h(estimate, pixel))
+    assert_array_equal(images.R, R)
 
 
 def test_any_state_with_three_fields_will_do():

@@ -56,23 +56,21 @@ def test_acceleration_is_equation_36_row_by_row():
         assert_allclose(EARTH.acceleration(np.array([x, y, z])), wanted, rtol=1e-14)
 
 
-def test_acceleration_is_the_gradient_of_the_potential():
+def potential(r):
+    """mu/r (1 - J2 (Re/r)^2 P2(sin latitude)), P2(s) = (3 s^2 - 1) / 2."""
+    xp = r.__array_namespace__()
+    d = xp.sqrt(xp.sum(r * r, axis=-1))
+    legendre = (3 * (r[..., 2] / d) ** 2 - 1) / 2
+    return MU / d * (1 - J2 * (RE / d) ** 2 * legendre)
+
+
+def test_acceleration_is_the_gradient_of_the_potential_with_the_second_zonal_harmonic():
     """By JAX to rounding, and by differences with a step of 10 m."""
     r = states()[:, :3]
-    assert_close(EARTH.acceleration(r), by_jax(EARTH.potential, r), 1e-14)
+    assert_close(EARTH.acceleration(r), by_jax(potential, r), 1e-14)
     step = 10 * np.eye(3)[:, None]
-    difference = (EARTH.potential(r + step) - EARTH.potential(r - step)) / 20
+    difference = (potential(r + step) - potential(r - step)) / 20
     assert_close(np.moveaxis(difference, 0, -1), EARTH.acceleration(r), 1e-9)
-
-
-def test_potential_has_the_second_zonal_harmonic():
-    """mu/r (1 - J2 (Re/r)^2 P2(sin latitude)), P2(s) = (3 s^2 - 1) / 2."""
-    for r in states()[:, :3]:
-        d = np.linalg.norm(r)
-        legendre = (3 * (r[2] / d) ** 2 - 1) / 2
-        assert_allclose(
-            EARTH.potential(r), MU / d * (1 - J2 * (RE / d) ** 2 * legendre), rtol=1e-15
-        )
 
 
 def test_gravity_gradient():
@@ -164,7 +162,7 @@ def test_runge_kutta_keeps_energy_and_momentum():
     """Both integrals of the oblate problem, over 2000 s."""
     path = Orbit(substeps=2000).interval(states()).path
     r, v = path[..., :3], path[..., 3:]
-    energy = np.sum(v * v, axis=-1) / 2 - EARTH.potential(r)
+    energy = np.sum(v * v, axis=-1) / 2 - potential(r)
     momentum = r[..., 0] * v[..., 1] - r[..., 1] * v[..., 0]
     for integral in (energy, momentum):
         assert_allclose(integral, np.broadcast_to(integral[0], integral.shape), rtol=1e-12)

@@ -22,7 +22,7 @@ from navfilters.estimators.prediction import (
     predict_unscented,
 )
 from navfilters.estimators.rule import Rule
-from navfilters.estimators.state import FilterState, first_state, given_prior, keep, missed
+from navfilters.estimators.state import FilterState, first_state, given_prior, keep, kept, missed
 from navfilters.estimators.update import (
     FORMS,
     Form,

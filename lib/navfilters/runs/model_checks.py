@@ -137,6 +137,11 @@ def _fits(z, prior: Gaussian, model: MeasurementModel, axes: str, name: str) -> 
             f"{prior.cov.shape}"
         )
     if size not in (None, prior.cov.shape[-1]):
+        if hasattr(model, "retract"):
+            raise ValueError(
+                f"{name}.cov must have shape (..., {size}, {size}), as model.jacobian has {size} "
+                f"columns; found {prior.cov.shape}"
+            )
         raise ValueError(
             f"{name}.mean must have shape (..., {size}) for this model; found {prior.mean.shape}"
         )

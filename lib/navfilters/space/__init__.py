@@ -14,8 +14,10 @@ from navfilters.space.frames import (
     geodetic_to_ecef,
 )
 from navfilters.space.gravity import EARTH, Gravity
-from navfilters.space.image_measurement import Measurement, NavigationState, SarGeometry
+from navfilters.space.image_measurement import Measurement, SarGeometry
+from navfilters.space.image_sensor import Pixel, SarPass
 from navfilters.space.inertial_orbit import INTEGRATORS, Orbit
+from navfilters.space.navigation_state import NavigationState
 from navfilters.space.orbit_interval import Interval
 from navfilters.space.osculating_ellipse import perigee_apogee
 from navfilters.space.pose import difference, retract
@@ -45,7 +47,9 @@ __all__ = [
     "Measurement",
     "NavigationState",
     "Orbit",
+    "Pixel",
     "SarGeometry",
+    "SarPass",
     "StarEarthSensor",
     "Thrust",
     "antenna_axes",

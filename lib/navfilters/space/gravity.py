@@ -1,4 +1,4 @@
-"""The pull of an oblate Earth: potential, acceleration and gradient."""
+"""The pull of an oblate Earth: acceleration and gradient."""
 
 from dataclasses import dataclass
 
@@ -43,31 +43,13 @@ class Gravity:
                 needed = "a number" if name == "J2" else "a positive number"
                 raise ValueError(f"{name} must be {needed}; found {getattr(self, name)}")
 
-    def potential(self, r: Array) -> Array:
-        """mu/r (1 - J2/2 (R_e/r)^2 (3 z^2/r^2 - 1)), whose gradient is the acceleration.
-
-        Parameters
-        ----------
-        r : array (..., 3)
-            Position from the body's centre, m; the third axis is its axis of symmetry.
-
-        Returns
-        -------
-        array (...)
-            m^2/s^2.
-        """
-        xp = r.__array_namespace__()
-        s = 1 / dot(r, r)
-        z = r[..., 2]
-        return self.mu * xp.sqrt(s) * (1 - self._k * s * (z * z * s - 1 / 3))
-
     def acceleration(self, r: Array) -> Array:
         """-mu/r^3 (r (1 + k (1 - 5 z^2/r^2)) + 2 k z e_z),   k = 3/2 J2 (R_e/r)^2.
 
         Parameters
         ----------
         r : array (..., 3)
-            Position, m, as for the potential.
+            Position from the body's centre, m; the third axis is its axis of symmetry.
 
         Returns
         -------
@@ -93,7 +75,7 @@ class Gravity:
         Parameters
         ----------
         r : array (..., 3)
-            Position, m, as for the potential.
+            Position, m, as for the acceleration.
 
         Returns
         -------

@@ -1,6 +1,7 @@
 """An image as a sensor: its centre pixel makes the measurement, and its time the attitude."""
 
-from dataclasses import dataclass, field, replace
+from copy import copy
+from dataclasses import dataclass, field
 from typing import Any
 
 from navfilters.space.navigation_state import NavigationState
@@ -64,8 +65,9 @@ class SarPass:
 
     def at(self, k: Array) -> Any:
         """The geometry at update k, from 0."""
-        xp = self.T_e_b.__array_namespace__()
-        return replace(self.geometry, T_e_b=xp.take(self.T_e_b, k, axis=0))
+        here = copy(self.geometry)  # not replace(), which would check the values again
+        object.__setattr__(here, "T_e_b", self.T_e_b[k])
+        return here
 
     retract = staticmethod(retract)
     difference = staticmethod(difference)

@@ -12,7 +12,7 @@ from navfilters.book.plotting.curves import (
     sweep_panels,
 )
 from navfilters.book.plotting.drawings import block_diagram, coastlines, map_panels
-from navfilters.book.plotting.spreads import nine_errors
+from navfilters.book.plotting.spreads import nees_tails, nine_errors
 from navfilters.book.plotting.styles import (
     BOUND,
     EKF,
@@ -44,6 +44,7 @@ __all__ = [
     "label_ends",
     "map_panels",
     "mark_failures",
+    "nees_tails",
     "nine_errors",
     "panels",
     "sweep_panels",

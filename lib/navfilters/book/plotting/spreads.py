@@ -1,18 +1,19 @@
-"""Errors of many runs beside the deviations that a filter predicts."""
+"""Errors of many runs beside what a filter predicts of them."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 from navfilters.book.plotting.curves import panels
-from navfilters.book.plotting.styles import EKF, MEASUREMENT, SECOND_ORDER, TRUTH, UKF
+from navfilters.book.plotting.styles import BOUND, EKF, MEASUREMENT, SECOND_ORDER, TRUTH, UKF
 
 SPREADS: dict[str, dict[str, Any]] = {
     "predicted": {"color": MEASUREMENT, "linestyle": "-", "linewidth": 2.4},
     "sample": {"color": UKF, "linestyle": "--", "linewidth": 1.6},
     "sample, predicted geometry": {"color": SECOND_ORDER, "linestyle": "-.", "linewidth": 1.4},
-    "sample, open loop": {"color": EKF, "linestyle": ":", "linewidth": 1.6},
+    "sample, open loop": {"color": EKF, "linestyle": ":", "linewidth": 3.0},
 }
 """Matplotlib keywords of each kind of deviation."""
 
@@ -74,4 +75,36 @@ def nine_errors(
             ax.set_xlabel("time (s)")
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    return figure
+
+
+def nees_tails(
+    values: Mapping[str, Any], styles: Mapping[str, Mapping[str, Any]], dof: int = 9
+) -> Any:
+    """The fraction of the runs whose NEES exceeds a value.
+
+    Dotted is the chi-square distribution of a consistent filter, grey its bound of one percent.
+
+    Parameters
+    ----------
+    values : mapping of str to array (runs,)
+    styles : mapping of str to mapping
+        Matplotlib keywords of each line.
+    dof : int
+
+    Returns
+    -------
+    Figure
+    """
+    figure, (ax,) = panels(1, 1, figsize=(7.0, 3.8))
+    grid = np.linspace(0, 60, 200)
+    right = stats.chi2.sf(grid, dof)
+    ax.plot(grid, right, linestyle=":", color=TRUTH, label="chi-square")
+    for name, each in values.items():
+        fraction = 1 - np.arange(len(each)) / len(each)
+        ax.step(np.sort(each), fraction, label=name, **styles[name])
+    ax.axvline(stats.chi2.ppf(0.99, dof), color=BOUND, linewidth=1)
+    ax.set(yscale="log", xlim=(0, 160), ylim=(1.5e-3, 1.2))
+    ax.set(xlabel="NEES", ylabel="fraction above")
+    ax.legend()
     return figure

@@ -40,7 +40,13 @@ from navfilters.papers.pogorelsky2020.imaging import (
     Imaging,
     same_images,
 )
-from navfilters.papers.pogorelsky2020.linearised import FixedModel, Leg, linearised_flight
+from navfilters.papers.pogorelsky2020.linearised import (
+    Altered,
+    FixedModel,
+    Leg,
+    Seen,
+    linearised_flight,
+)
 from navfilters.papers.pogorelsky2020.noise_draws import Noise, misalignment, noise
 from navfilters.papers.pogorelsky2020.open_loop import (
     MonteCarlo,
@@ -81,6 +87,7 @@ __all__ = [
     "UPDATES",
     "Acquisition",
     "Agreement",
+    "Altered",
     "Attempt",
     "Campaign",
     "FixedModel",
@@ -96,6 +103,7 @@ __all__ = [
     "Patch",
     "RealAttempt",
     "RealImages",
+    "Seen",
     "Setup",
     "SimulatedImages",
     "Truth",

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -166,9 +166,7 @@ def monte_carlo_closed(
     seed: int = 0,
     *,
     imaging: Imaging = FULL,
-    geometry: Literal["nominal", "predicted"] = "nominal",
     progress: Callable[[Iterable], Iterable] = iter,
-    **options: Any,
 ) -> MonteCarlo:
     """All runs of a test case with three images, at 8.33, 16.67 and 25 s, and a coast to 41.67 s.
 
@@ -178,15 +176,11 @@ def monte_carlo_closed(
     runs : int or sequence of int
         How many, or which.
     seed : int
-        First estimates and range errors, as in ``sar_trn.monte_carlo``; the images have
+        First estimates and range errors, as of ``monte_carlo``; the images have
         ``imaging.seed``.
     imaging : Imaging
-    geometry : {"nominal", "predicted"}
-        See ``Images``.
     progress : callable
         Wraps the iterable of intervals.
-    **options
-        To ``sar_trn.monte_carlo``, but ``updates`` and ``measure``.
 
     Returns
     -------
@@ -199,8 +193,8 @@ def monte_carlo_closed(
     pogorelsky2020, Figs. 8 and 10.
     """
     setup = replace(of_case(case), walk=False)
-    images = Images(setup, runs, seed, imaging, geometry)
-    return monte_carlo(setup, UPDATES, runs, seed, measure=images, progress=progress, **options)
+    images = Images(setup, runs, seed, imaging)
+    return monte_carlo(setup, UPDATES, runs, seed, measure=images, progress=progress)
 
 
 def closed_table(

@@ -53,12 +53,15 @@ class Seen(NamedTuple):
         Number of the image, from 1.
     state : NavigationState
         What the filter predicts.
+    P : array (..., 9, 9)
+        Covariance of its error, as the filter believes.
     image : Measurement
     geometry : SarGeometry
     """
 
     k: int
     state: NavigationState
+    P: Array
     image: Measurement
     geometry: SarGeometry
 
@@ -103,8 +106,9 @@ class Altered:
 
     def update(self, state: Any, z: Array, sensor: Any, k: int = 0) -> Any:
         """As of ``filter``, with what was changed."""
-        own = NavigationState.of(state.estimate.mean)
-        y, H, R = self.change(Seen(k + 1, own, Measurement.of(z), at(sensor, k)))
+        x, P = state.estimate
+        seen = Seen(k + 1, NavigationState.of(x), P, Measurement.of(z), at(sensor, k))
+        y, H, R = self.change(seen)
         return self.filter.update(state, y, FixedModel(H, R), k)
 
     step = Filter.step
@@ -170,7 +174,7 @@ def linearised_flight(setup: Setup, flight: Truth, images: int = 72) -> tuple[li
         pixel = ellipsoid_intersection(r, model.boresight(NOMINAL))
         image = Measurement(pixel, np.linalg.norm(pixel - r), np.linalg.norm(v))
         state = NavigationState(r, v, NOMINAL)
-        _, H, R = Seen(k, state, image, model).linearise()
+        _, H, R = Seen(k, state, before, image, model).linearise()
         b = setup.underweighting if k <= setup.underweighted else 0.0
         legs.append(Leg(F, before - F @ P @ F.T, H, R, b * H @ before @ H.T, image, model))
         estimator = setup.mekf

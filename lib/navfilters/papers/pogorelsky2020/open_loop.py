@@ -11,7 +11,7 @@ from navfilters.numerics import validation
 from navfilters.papers.pogorelsky2020.experiment import PAPER, Setup, of_case
 from navfilters.papers.pogorelsky2020.noise_draws import Noise, misalignment, noise
 from navfilters.papers.pogorelsky2020.true_flight import Truth, truth
-from navfilters.runs.consistency import mean_nees, sample_deviation
+from navfilters.runs.consistency import SampleDeviation, mean_nees, sample_deviation
 from navfilters.runs.loop import run
 from navfilters.space.frames import east_north_up, ellipsoid_intersection
 from navfilters.space.image_measurement import Measurement
@@ -72,12 +72,12 @@ class SimulatedImages:
         )
 
     def true_state(self, k: int) -> NavigationState:
-        """The state that the image after interval k is made at.
+        """The state at the start, or that the image after interval k is made at.
 
         Parameters
         ----------
         k : int
-            From 1.
+            From 0.
 
         Returns
         -------
@@ -134,6 +134,19 @@ class MonteCarlo:
     covariances: Array
     innovations: Array
     S: Array
+
+    def spread(self, confidence: float = 0.95) -> SampleDeviation:
+        """Sample and predicted deviations over the runs, at each time: (t, 9).
+
+        Parameters
+        ----------
+        confidence : float
+
+        Returns
+        -------
+        SampleDeviation
+        """
+        return sample_deviation(self.errors, self.covariances, runs_axis=1, confidence=confidence)
 
 
 def monte_carlo(

@@ -83,7 +83,7 @@ def run_filter(
     setup : Setup
         The same.
     runs : int
-        Each has a first estimate and range errors of its own: see ``sar_trn.noise``.
+        Each has a first estimate and range errors of its own: see ``noise``.
     seed : int
     imaging : Imaging
         The same.

@@ -63,6 +63,12 @@ COVER = {
 }
 """Classes of the synthetic land cover; levels are of the order seen at L band."""
 
+SPACING = 8.0
+"""Of a drawn raster, m."""
+
+PATCH = 120.0
+"""Correlation length of the fields that compete, m: the size of a patch of one class."""
+
 
 @dataclass(frozen=True, eq=False)
 class LandCover:
@@ -80,15 +86,7 @@ class LandCover:
     spacing: float
 
     @classmethod
-    def draw(
-        cls,
-        half_width: float,
-        seed: Any,
-        *,
-        spacing: float = 8.0,
-        patch: float = 120.0,
-        classes: dict[str, CoverClass] = COVER,
-    ) -> "LandCover":
+    def draw(cls, half_width: float, seed: Any) -> "LandCover":
         """Draw one: each class has a smooth random field, and the highest field wins.
 
         Parameters
@@ -96,28 +94,22 @@ class LandCover:
         half_width : float
             Of the square, m.
         seed : int or sequence of int
-        spacing : float
-            Of the raster, m.
-        patch : float
-            Correlation length of the fields that compete, m: the size of a patch of one class.
-        classes : dict of CoverClass
 
         Returns
         -------
         LandCover
         """
-        for name, value in (("half_width", half_width), ("spacing", spacing), ("patch", patch)):
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"{name} must be a positive number of m; found {value}")
-        n, rng = 2 * int(np.ceil(half_width / spacing)) + 1, np.random.default_rng(seed)
+        if not (np.isfinite(half_width) and half_width > 0):
+            raise ValueError(f"half_width must be a positive number of m; found {half_width}")
+        n, rng = 2 * int(np.ceil(half_width / SPACING)) + 1, np.random.default_rng(seed)
         best = np.full((n, n), -np.inf, np.float32)
         level = np.zeros((n, n), np.float32)
-        for kind in classes.values():
-            rank = kind.share + smooth_field((n, n), patch / spacing, rng)
-            mine = kind.level + kind.texture * smooth_field((n, n), kind.length / spacing, rng)
+        for kind in COVER.values():
+            rank = kind.share + smooth_field((n, n), PATCH / SPACING, rng)
+            mine = kind.level + kind.texture * smooth_field((n, n), kind.length / SPACING, rng)
             level = np.where(rank > best, mine, level)
             best = np.maximum(rank, best)
-        return cls(10 ** (level / 10), spacing)
+        return cls(10 ** (level / 10), SPACING)
 
     def at(self, east: Array, north: Array) -> Array:
         """Reflectivity of places, linear between the raster's.

@@ -146,15 +146,19 @@ class Scene:
         return outwards < np.maximum.accumulate(outwards, axis=1)
 
 
+DENSITY = 5.0
+"""Bright points of a drawn scene in a square kilometre."""
+
+POWERS = (27.0, 41.0)
+"""Their cross-sections are spread evenly between these, dB; a cell of PALSAR's raster has 14."""
+
+
 def draw_scene(
     terrain: Terrain,
     centre: LocalMap,
     seed: Any = 0,
     *,
     half_width: float = 10000.0,
-    density: float = 5.0,
-    powers: tuple[float, float] = (27.0, 41.0),
-    **cover: Any,
 ) -> Scene:
     """A scene with a land cover and bright points drawn at random.
 
@@ -166,13 +170,6 @@ def draw_scene(
     seed : int or sequence of int
     half_width : float
         Of the square that is drawn, m.
-    density : float
-        Bright points in a square kilometre.
-    powers : tuple of float
-        Their cross-sections are spread evenly between these, dB: see ``Points``. A cell of PALSAR's
-        raster has 14 dB.
-    **cover
-        To ``LandCover.draw``.
 
     Returns
     -------
@@ -180,8 +177,8 @@ def draw_scene(
     """
     seeds = np.random.SeedSequence(seed).spawn(2)
     rng = np.random.default_rng(seeds[1])
-    number = round(density * (2 * half_width / 1000) ** 2)
+    number = round(DENSITY * (2 * half_width / 1000) ** 2)
     east, north = rng.uniform(-half_width, half_width, (2, number))
-    power = 10 ** (rng.uniform(*powers, number) / 10)
-    drawn = LandCover.draw(half_width, seeds[0], **cover)
+    power = 10 ** (rng.uniform(*POWERS, number) / 10)
+    drawn = LandCover.draw(half_width, seeds[0])
     return Scene(centre, terrain, drawn, Points(east, north, power))

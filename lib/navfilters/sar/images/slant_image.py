@@ -63,8 +63,3 @@ class Image(NamedTuple):
     def centre_range(self) -> float:
         """Slant range of the centre pixel, r_0 + (k_c - 1) dr, m. Eq. (1), which counts from 1."""
         return self.near_range + self.pixels.shape[1] // 2 * self.range_spacing
-
-    @property
-    def centre_time(self) -> float:
-        """Zero-Doppler time of the centre pixel, s."""
-        return self.first_time + self.pixels.shape[0] // 2 / self.prf

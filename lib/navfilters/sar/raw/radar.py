@@ -36,8 +36,6 @@ class Radar:
         Reflectivity that the thermal noise equals, dB of the scene's unit.
     falling : bool
         Whether the chirp's frequency falls, as PALSAR's does.
-    flat_beam : bool
-        Whether the antenna is uniform over the illuminated angle, for tests against theory.
 
     Raises
     ------
@@ -63,7 +61,6 @@ class Radar:
     squint: float = 0.0
     nesz: float = -23.0
     falling: bool = True
-    flat_beam: bool = False
 
     def __post_init__(self) -> None:
         for name in ("wavelength", "bandwidth", "pulse_length", "sampling", "prf", "antenna"):
@@ -108,7 +105,7 @@ class Radar:
         ndarray (...)
         """
         u = self.antenna / self.wavelength * (np.asarray(sine) - np.sin(np.deg2rad(self.squint)))
-        return np.where(np.abs(u) <= 0.5, 1.0 if self.flat_beam else np.sinc(u) ** 2, 0.0)
+        return np.where(np.abs(u) <= 0.5, np.sinc(u) ** 2, 0.0)
 
 
 PALSAR = Radar()
