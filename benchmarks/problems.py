@@ -64,8 +64,7 @@ class Coasting:
 
     def transition(self, x: Array) -> tuple[Array, Array]:
         """The same and its Jacobian, (..., 6) and (..., 6, 6); ours asks for it too."""
-        interval = self.orbit.interval(x)
-        return interval.path[-1], interval.F
+        return self.orbit.transition(x)
 
     def h(self, x: Array, q: Array, z: Array) -> Array:
         """Expected angles, (2,)."""
@@ -255,7 +254,7 @@ def coasting() -> Coasting:
     orbit = Orbit(setup.gravity, step=10.0, substeps=setup.interval // 10)
     x, angles = setup.x0, []
     for _ in range(LONGEST):
-        x = orbit.interval(x).path[-1]
+        x = orbit.f(x)
         angles.append(setup.sensor.h(x))
     first = Gaussian(setup.x0, setup.prior.cov)
     return Coasting(orbit, setup.sensor, Q, first, np.array(angles))

@@ -12,7 +12,8 @@ from navfilters.space import frames, quaternions
 from navfilters.space.earth_fixed_orbit import EarthFixedOrbit
 from navfilters.space.gravity import Gravity
 from navfilters.space.image_measurement import Measurement, SarGeometry
-from navfilters.space.inertial_orbit import Orbit, perigee_apogee
+from navfilters.space.inertial_orbit import Orbit
+from navfilters.space.osculating_ellipse import perigee_apogee
 from navfilters.space.star_earth_sensor import StarEarthSensor
 from navfilters.space.thrust import Thrust
 

@@ -22,7 +22,8 @@ from navfilters.papers.xiong2009.monte_carlo import (
 )
 from navfilters.papers.xiong2009.true_flight import truth
 from navfilters.space.gravity import EARTH
-from navfilters.space.inertial_orbit import Orbit, perigee_apogee
+from navfilters.space.inertial_orbit import Orbit
+from navfilters.space.osculating_ellipse import perigee_apogee
 
 pytestmark = pytest.mark.slow
 

@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 
 from navfilters.space import inertial_orbit
 from navfilters.space.gravity import EARTH, Gravity
-from navfilters.space.inertial_orbit import Orbit, perigee_apogee
+from navfilters.space.inertial_orbit import Orbit
+from navfilters.space.osculating_ellipse import perigee_apogee
 from navfilters.space.thrust import COASTING, Thrust
 
 MU, RE, J2 = 3.986004418e14, 6378137.0, 1.08262668e-3

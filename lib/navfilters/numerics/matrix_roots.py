@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from navfilters.numerics.loops import is_jax
 from navfilters.numerics.small_matrices import (
     _deferred_cholesky,
     _rounding,
@@ -77,7 +78,7 @@ def _where_any(some: Array, function: Callable, otherwise: Callable, *arrays: Ar
     What is right for all members is function; a branch that compiles saves it.
     """
     xp = some.__array_namespace__()
-    if not xp.__name__.startswith("jax"):
+    if not is_jax(xp):
         return function(*arrays)
     cond = importlib.import_module("jax").lax.cond
     return cond(xp.any(some), function, otherwise, *arrays)

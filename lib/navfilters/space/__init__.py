@@ -14,7 +14,9 @@ from navfilters.space.frames import (
 )
 from navfilters.space.gravity import EARTH, Gravity
 from navfilters.space.image_measurement import Measurement, NavigationState, SarGeometry
-from navfilters.space.inertial_orbit import CACHED, INTEGRATORS, Interval, Orbit, perigee_apogee
+from navfilters.space.inertial_orbit import CACHED, INTEGRATORS, Orbit
+from navfilters.space.orbit_interval import Interval
+from navfilters.space.osculating_ellipse import perigee_apogee
 from navfilters.space.quaternions import (
     conjugate,
     cross_matrix,

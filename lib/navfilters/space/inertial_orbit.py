@@ -1,5 +1,7 @@
 """Motion in orbit in inertial axes."""
 
+from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -8,90 +10,13 @@ import numpy as np
 
 from navfilters.numerics import validation
 from navfilters.numerics.analytic import dot
+from navfilters.numerics.loops import is_jax, repeat
 from navfilters.numerics.runge_kutta import runge_kutta
 from navfilters.space.gravity import EARTH, Gravity
-from navfilters.space.thrust import COASTING, Thrust
+from navfilters.space.orbit_interval import Interval
+from navfilters.space.thrust import COASTING, Thrust, along_velocity
+from navfilters.space.variations import forwards, middle, rates, series
 from navfilters.types import Array
-
-
-@dataclass(frozen=True, eq=False)
-class Interval:
-    """One sampling interval of an orbit, linearised about the estimate it starts from.
-
-    Made by :meth:`Orbit.interval`; it is the dynamics that a filter asks for in one step.
-
-    Parameters
-    ----------
-    orbit : Orbit
-    start : array (..., 6)
-        State at the start: position, m, and velocity, m/s.
-    t : float
-        Time of the start, s.
-    path : array (substeps, ..., 6)
-        State after each sub-step.
-    F : array (..., 6, 6)
-        Derivative of the last state with respect to the first.
-    to_end : list of array (..., 6, 6)
-        Derivative of the last state with respect to that after each sub-step.
-    """
-
-    orbit: "Orbit"
-    start: Array
-    t: float
-    path: Array
-    F: Array
-    to_end: list[Array]
-
-    @property
-    def Q(self) -> Array:
-        """Covariance of the noise of *one sub-step*, (..., 6, 6): see ``accumulate``."""
-        return self.orbit.Q
-
-    def transition(self, x: Array) -> tuple[Array, Array]:
-        """The state at the interval's end, and its derivative with respect to x.
-
-        Parameters
-        ----------
-        x : array (..., 6)
-            State at the start. Another object than ``start`` is propagated anew.
-
-        Returns
-        -------
-        tuple of array (..., 6), array (..., 6, 6)
-            f(x) and F.
-
-        References
-        ----------
-        xiong2009, Eqs. (3)-(4).
-        """
-        if x is not self.start:
-            return self.orbit.interval(x, self.t).transition(x)
-        return self.path[-1], self.F
-
-    def accumulate(self, Q: Array, x: Array) -> Array:
-        """Covariance at the interval's end of a noise that enters after every sub-step.
-
-        sum_k Phi_k Q Phi_k^T,   Phi_k = d x(end) / d x(after sub-step k):
-        exactly what repeating P <- F P F^T + Q sub-step by sub-step adds to F P F^T.
-
-        Parameters
-        ----------
-        Q : array (..., 6, 6)
-            Covariance of each sub-step's noise: m^2, m^2/s, m^2/s^2.
-        x : array (..., 6)
-            As in ``transition``.
-
-        Returns
-        -------
-        array (..., 6, 6)
-
-        References
-        ----------
-        xiong2009, Eqs. (4) and (41).
-        """
-        if x is not self.start:
-            return self.orbit.interval(x, self.t).accumulate(Q, x)
-        return sum(Phi @ Q @ Phi.mT for Phi in self.to_end)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +39,8 @@ class Orbit:
     integrator : {"rk4", "euler"}
         The classical Runge-Kutta step, with the exponential of the midpoint's Jacobian to third
         order for F; or the step that the paper prints.
+    start : float
+        Time of the interval's start, s, for the thrust.
 
     Raises
     ------
@@ -136,6 +63,7 @@ class Orbit:
     step: float = 1.0
     substeps: int = 100
     integrator: Literal["rk4", "euler"] = "rk4"
+    start: float = 0.0
 
     def __post_init__(self) -> None:
         if self.integrator not in INTEGRATORS:
@@ -147,16 +75,37 @@ class Orbit:
         substeps = validation.whole_number("substeps", self.substeps, 1)
         object.__setattr__(self, "substeps", substeps)
         Q = np.zeros((6, 6)) if self.Q is None else self.Q
+        start = validation.number("start", self.start, needed="a finite number of seconds")
+        object.__setattr__(self, "start", start)
         object.__setattr__(self, "Q", validation.covariance("Q", Q, 6, definite=False))
 
-    def derivative(self, x: Array, thrust: float = 0.0) -> Array:
+    def at(self, k: Array) -> "Orbit":
+        """The orbit in the interval after k others.
+
+        Parameters
+        ----------
+        k : int
+            From 0; under JAX it may be traced.
+
+        Returns
+        -------
+        Orbit
+            Itself, if it coasts: time matters to the thrust alone.
+        """
+        if self.thrust.coasts:
+            return self
+        later = copy(self)  # not replace(), which would check the values again
+        object.__setattr__(later, "start", self.start + k * (self.substeps * self.step))
+        return later
+
+    def derivative(self, x: Array, thrust: Array | None = None) -> Array:
         """dx/dt: velocity, and gravity with a thrust along the velocity.
 
         Parameters
         ----------
         x : array (..., 6)
             Position, m, and velocity, m/s.
-        thrust : float
+        thrust : array (...), optional
             Acceleration of the thruster, m/s^2.
 
         Returns
@@ -170,7 +119,7 @@ class Orbit:
         xp = x.__array_namespace__()
         v = x[..., 3:]
         a = self.gravity.acceleration(x[..., :3])
-        if thrust:
+        if thrust is not None:
             a = a + v * (thrust / xp.sqrt(dot(v, v)))[..., None]
         return xp.concat([v, a], axis=-1)
 
@@ -193,12 +142,88 @@ class Orbit:
         E_r, E_v = xp.asarray(POSITION), xp.asarray(VELOCITY)
         of_x = self.gravity.gradient(x[..., :3]) @ E_r
         if thrust is not None:
-            v = x[..., 3:]
-            speed = xp.sqrt(dot(v, v))
-            u = v / speed[..., None]
-            across = xp.eye(3) - u[..., :, None] * u[..., None, :]
-            of_x = of_x + (xp.asarray(thrust) / speed)[..., None, None] * (across @ E_v)
+            of_x = of_x + along_velocity(x[..., 3:], thrust) @ E_v
         return E_r.mT @ E_v + E_v.mT @ of_x
+
+    def f(self, x: Array) -> Array:
+        """The state at the interval's end.
+
+        Parameters
+        ----------
+        x : array (..., 6)
+            Position, m, and velocity, m/s, at its start.
+
+        Returns
+        -------
+        array (..., 6)
+        """
+        return repeat(self._advance, x, self.substeps, x.__array_namespace__())
+
+    def transition(self, x: Array) -> tuple[Array, Array]:
+        """The state at the interval's end, and its derivative with respect to x.
+
+        Parameters
+        ----------
+        x : array (..., 6)
+
+        Returns
+        -------
+        tuple of array (..., 6), array (..., 6, 6)
+            f(x) and F.
+
+        References
+        ----------
+        xiong2009, Eqs. (3)-(4).
+        """
+        if is_jax(x.__array_namespace__()):
+            return self._forwards(x)
+        states = self._states(x, self.start)
+        *_, F = self._to_end(states, self.start)
+        return states[-1], F
+
+    def propagate(self, x: Array, Q: Array) -> tuple[Array, Array, Array]:
+        """The same, and the covariance at the end of a noise that enters after every sub-step.
+
+        W = sum_k Phi_k Q Phi_k^T,   Phi_k = d x(end) / d x(after sub-step k):
+        exactly what repeating P <- F P F^T + Q sub-step by sub-step adds to F P F^T.
+
+        Parameters
+        ----------
+        x : array (..., 6)
+        Q : array (..., 6, 6)
+            Covariance of each sub-step's noise: m^2, m^2/s, m^2/s^2.
+
+        Returns
+        -------
+        tuple of array (..., 6), array (..., 6, 6), array (..., 6, 6)
+            f(x), F and W.
+
+        References
+        ----------
+        xiong2009, Eqs. (4) and (41).
+        """
+        if is_jax(x.__array_namespace__()):
+            return self._forwards(x, Q)
+        states = self._states(x, self.start)
+        *to_end, F = self._to_end(states, self.start)
+        return states[-1], F, sum(Phi @ Q @ Phi.mT for Phi in reversed(to_end))
+
+    def path(self, x: Array, t: Array | None = None) -> Array:
+        """The states after every sub-step.
+
+        Parameters
+        ----------
+        x : array (..., 6)
+            Position, m, and velocity, m/s, at the interval's start.
+        t : float or array, optional
+            Time of the start, s: an array of the leading axes of x has one for each. By default
+            ``start``.
+
+        Returns
+        -------
+        array (substeps, ..., 6)
+        """
+        return self._states(x, self.start if t is None else t)[1:]
 
     def interval(self, x: Array, t: float = 0.0) -> Interval:
         """Propagate a state over one sampling interval, and linearise about its path.
@@ -214,19 +239,8 @@ class Orbit:
         -------
         Interval
         """
-        xp = x.__array_namespace__()
-        advance = INTEGRATORS[self.integrator]
-        path = [x]
-        for thrust in self._thrusts(t, self.substeps):
-            path.append(advance(partial(self.derivative, thrust=thrust), path[-1], self.step))
-        states = xp.stack(path)
-        to_end = [xp.zeros_like(x)[..., None] + xp.eye(6)]
-        size = max(1, CACHED // max(1, x[..., 0].size))
-        for first in reversed(range(0, self.substeps, size)):
-            steps = self.transitions(states[first : first + size + 1], t + first * self.step)
-            for k in reversed(range(steps.shape[0])):
-                to_end.append(to_end[-1] @ steps[k])
-        F = to_end.pop()
+        states = self._states(x, t)
+        *to_end, F = self._to_end(states, t)
         return Interval(self, x, t, states[1:], F, to_end[::-1])
 
     def transitions(self, path: Array, t: float = 0.0) -> Array:
@@ -244,22 +258,60 @@ class Orbit:
         array (k, ..., 6, 6)
         """
         xp = path.__array_namespace__()
-        thrusts = self._thrusts(t, path.shape[0] - 1)
-        thrust = None
-        if any(thrusts):
-            thrust = xp.reshape(xp.asarray(thrusts), (-1, *(1,) * (path.ndim - 2)))
-        h, x, x_next = self.step, path[:-1], path[1:]
+        times = t + self.step * (np.arange(path.shape[0] - 1) + 0.5)
+        thrust = self._push(times, path.ndim - 1)
+        h, x = self.step, path[:-1]
         if self.integrator == "euler":
             return xp.eye(6) + h * self.jacobian(x, thrust)
-        middle = (x + x_next) / 2
-        bend = (x[..., 3:] - x_next[..., 3:]) * (h / 8)  # of the cubic through both velocities
-        middle = xp.concat([middle[..., :3] + bend, middle[..., 3:]], axis=-1)
-        hA = h * self.jacobian(middle, thrust)
+        hA = h * self.jacobian(middle(x, path[1:], h), thrust)
         return xp.eye(6) + hA @ (xp.eye(6) + hA @ (xp.eye(6) / 2 + hA / 6))
 
-    def _thrusts(self, t: float, count: int) -> list[float]:
-        """Strength in the middle of each of so many sub-steps."""
-        return [self.thrust.strength(t + self.step * (k + 0.5)) for k in range(count)]
+    def _push(self, t: Array, axes: int) -> Array | None:
+        """Strength at a time, or at one for each of some leading axes of so many; None for zero."""
+        if self.thrust.coasts:
+            return None
+        strength = self.thrust.strength(t)
+        if isinstance(strength, np.ndarray) and not strength.any():
+            return None
+        return strength[(..., *(None,) * (axes - strength.ndim))]
+
+    def _advance(self, k: Array, x: Array, t: Array | None = None) -> Array:
+        """Sub-step k; its thrust is that of its middle."""
+        t = (self.start if t is None else t) + self.step * (k + 0.5)
+        derivative = partial(self.derivative, thrust=self._push(t, x.ndim - 1))
+        return INTEGRATORS[self.integrator](derivative, x, self.step)
+
+    def _states(self, x: Array, t: Array) -> Array:
+        states = [x]
+        for k in range(self.substeps):
+            states.append(self._advance(k, states[-1], t))
+        return x.__array_namespace__().stack(states)
+
+    def _to_end(self, states: Array, t: float) -> Iterator[Array]:
+        """Derivative of the last state with respect to each, from the last to the first."""
+        xp = states.__array_namespace__()
+        Phi = xp.zeros_like(states[0])[..., None] + xp.eye(6)
+        yield Phi
+        size = max(1, CACHED // max(1, states[0, ..., 0].size))
+        for first in reversed(range(0, self.substeps, size)):
+            steps = self.transitions(states[first : first + size + 1], t + first * self.step)
+            for k in reversed(range(steps.shape[0])):
+                Phi = Phi @ steps[k]
+                yield Phi
+
+    def _forwards(self, x: Array, Q: Array | None = None) -> tuple[Array, ...]:
+        """f(x), F and, given Q, W, for JAX."""
+
+        def sub_step(k: Array, x: Array) -> tuple[Array, Callable]:
+            x_next = self._advance(k, x)
+            thrust, at, order = self._push(self.start + self.step * (k + 0.5), x.ndim - 1), x, 1
+            if self.integrator == "rk4":
+                at, order = middle(x, x_next, self.step), 3
+            V = None if thrust is None else along_velocity(at[..., 3:], thrust)
+            A = partial(rates, self.gravity.gradient(at[..., :3]), V)
+            return x_next, partial(series, A, self.step, order)
+
+        return forwards(sub_step, x, self.substeps, 6, Q)
 
 
 POSITION, VELOCITY = np.eye(6)[:3], np.eye(6)[3:]  # r = POSITION @ x; constants, not concat: faster
@@ -273,28 +325,3 @@ def _euler(derivative, x: Array, h: float) -> Array:
 
 
 INTEGRATORS = {"rk4": runge_kutta, "euler": _euler}
-
-
-def perigee_apogee(x: Array, gravity: Gravity = EARTH) -> tuple[Array, Array]:
-    """Heights of the osculating ellipse's perigee and apogee above the equatorial radius.
-
-    Parameters
-    ----------
-    x : array (..., 6)
-        Position, m, and velocity, m/s.
-    gravity : Gravity
-        Gives mu and the radius; J2 takes no part.
-
-    Returns
-    -------
-    tuple of array (...)
-        Metres.
-    """
-    xp = x.__array_namespace__()
-    r, v = x[..., :3], x[..., 3:]
-    distance = xp.sqrt(dot(r, r))
-    v2, rv = dot(v, v), dot(r, v)
-    a = 1 / (2 / distance - v2 / gravity.mu)
-    ev = (v2 / gravity.mu - 1 / distance)[..., None] * r - (rv / gravity.mu)[..., None] * v
-    e = xp.sqrt(dot(ev, ev))
-    return a * (1 - e) - gravity.radius, a * (1 + e) - gravity.radius

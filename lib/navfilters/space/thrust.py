@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from navfilters.numerics import validation
+from navfilters.numerics.analytic import dot
+from navfilters.types import Array
 
 
 @dataclass(frozen=True)
@@ -34,19 +36,51 @@ class Thrust:
         if 2 * len(self.arcs) != times.size or not (np.diff(times) >= 0).all():
             raise ValueError(f"arcs must be (start, end) pairs in order of time; found {self.arcs}")
 
-    def strength(self, t: float) -> float:
-        """Acceleration at time t, m/s^2: the magnitude from an arc's start to before its end.
+    @property
+    def coasts(self) -> bool:
+        """Whether it never pushes."""
+        return not (self.magnitude and self.arcs)
+
+    def strength(self, t: Array) -> Array:
+        """Acceleration at time t: the magnitude from an arc's start to before its end.
 
         Parameters
         ----------
-        t : float
+        t : float or array (...)
             Seconds.
 
         Returns
         -------
-        float
+        array (...)
+            m/s^2.
         """
-        return self.magnitude if any(start <= t < end for start, end in self.arcs) else 0.0
+        xp = t.__array_namespace__() if hasattr(t, "__array_namespace__") else np
+        start, end = np.reshape(np.asarray(self.arcs, float), (-1, 2)).T
+        t = xp.asarray(t)[..., None]
+        burns = xp.any((t >= xp.asarray(start)) & (t < xp.asarray(end)), axis=-1)
+        return xp.where(burns, self.magnitude, 0.0)
 
 
 COASTING = Thrust(0.0, ())
+
+
+def along_velocity(v: Array, thrust: Array) -> Array:
+    """Derivative of an acceleration along the velocity with respect to it: it turns with it.
+
+    Parameters
+    ----------
+    v : array (..., 3)
+        m/s.
+    thrust : array (...)
+        Acceleration, m/s^2.
+
+    Returns
+    -------
+    array (..., 3, 3)
+        s^-1.
+    """
+    xp = v.__array_namespace__()
+    speed = xp.sqrt(dot(v, v))
+    u = v / speed[..., None]
+    across = xp.eye(3) - u[..., :, None] * u[..., None, :]
+    return (xp.asarray(thrust) / speed)[..., None, None] * across

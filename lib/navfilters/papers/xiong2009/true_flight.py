@@ -10,7 +10,8 @@ from scipy.optimize import brentq
 
 from navfilters.papers.xiong2009.experiment import VARIANTS, Setup
 from navfilters.space.gravity import Gravity
-from navfilters.space.inertial_orbit import Orbit, perigee_apogee
+from navfilters.space.inertial_orbit import Orbit
+from navfilters.space.osculating_ellipse import perigee_apogee
 from navfilters.space.thrust import Thrust
 from navfilters.types import Array
 

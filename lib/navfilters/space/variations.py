@@ -1,0 +1,116 @@
+"""How small differences of position and velocity grow in a step: A = [0, I; G, V], written out."""
+
+from collections.abc import Callable
+
+from navfilters.numerics.loops import repeat
+from navfilters.numerics.small_matrices import written_out
+from navfilters.types import Array
+
+
+def rates(G: Array, V: Array | None, M: Array) -> Array:
+    """A M, the rate of change of M, of which only position and velocity change.
+
+    Parameters
+    ----------
+    G, V : array (..., 3, 3)
+        Derivatives of the acceleration with respect to position, s^-2, and velocity, s^-1; a V of
+        None is zero.
+    M : array (..., n, k)
+        n of at least 6.
+
+    Returns
+    -------
+    array (..., n, k)
+    """
+    of_v = M[..., 3:6, :]
+    of_a = written_out(G, M[..., :3, :])
+    if V is not None:
+        of_a = of_a + written_out(V, of_v)
+    xp = M.__array_namespace__()
+    return xp.concat([of_v, of_a, xp.zeros_like(M[..., 6:, :])], axis=-2)
+
+
+def series(A: Callable[[Array], Array], h: float, order: int, M: Array) -> Array:
+    """exp(h A) M to an order in h.
+
+    Parameters
+    ----------
+    A : callable
+        M -> A M.
+    h : float
+        Length of the step, s.
+    order : int
+    M : array (..., n, k)
+
+    Returns
+    -------
+    array (..., n, k)
+    """
+    grown = M
+    for i in range(order, 0, -1):  # Horner's scheme: M + h A (M + h/2 A (M + h/3 A M))
+        grown = M + (h / i) * A(grown)
+    return grown
+
+
+def forwards(
+    step: Callable[[Array, Array], tuple[Array, Callable[[Array], Array]]],
+    x: Array,
+    count: int,
+    n: int,
+    Q: Array | None = None,
+) -> tuple[Array, ...]:
+    """State, derivative and noise after some steps, from the first to the last.
+
+    F <- F_k F,   W <- F_k W F_k^T + Q
+
+    Parameters
+    ----------
+    step : callable
+        (k, x) -> the next x, and a function M -> F_k M.
+    x : array (..., m)
+        State at the start.
+    count : int
+    n : int
+        Size of the derivative, that of the error.
+    Q : array (..., n, n), optional
+        Covariance of the noise after each step.
+
+    Returns
+    -------
+    tuple of array (..., m), array (..., n, n) and, given Q, array (..., n, n)
+        x, F and W.
+
+    Notes
+    -----
+    One loop, which JAX compiles once for all steps.
+    """
+    xp = x.__array_namespace__()
+    F = xp.zeros_like(x[..., :1])[..., None] + xp.eye(n)
+    W = () if Q is None else (xp.zeros_like(F + Q),)
+
+    def advance(k: Array, carry: tuple) -> tuple:
+        x, F, *W = carry
+        x, grow = step(k, x)
+        return x, grow(F), *(grow(grow(w).mT) + Q for w in W)
+
+    return repeat(advance, (x, F, *W), count, xp)
+
+
+def middle(x: Array, x_next: Array, h: float) -> Array:
+    """Half a step on: the position is that of the cubic through both positions and velocities.
+
+    Parameters
+    ----------
+    x, x_next : array (..., 6)
+        Position, m, and velocity, m/s, a step apart.
+    h : float
+        Length of the step, s.
+
+    Returns
+    -------
+    array (..., 6)
+    """
+    xp = x.__array_namespace__()
+    mean = (x + x_next) / 2
+    bend = (x[..., 3:] - x_next[..., 3:]) * (h / 8)
+    return xp.concat([mean[..., :3] + bend, mean[..., 3:]], axis=-1)

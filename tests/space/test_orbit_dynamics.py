@@ -1,0 +1,143 @@
+"""An orbit as a filter's dynamics: both engines, the thrust's time, the paths of many updates."""
+
+from itertools import product
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from navfilters.space.inertial_orbit import Orbit
+from navfilters.space.thrust import COASTING, Thrust
+from navfilters.space.variations import series
+
+BURN = Thrust(0.45, ((30, 70), (140, 220)))
+Q = np.diag([4e-4, 4e-4, 4e-4, 4e-8, 1e-8, 9e-8])
+
+each_motion = pytest.mark.parametrize(
+    "orbit",
+    [Orbit(thrust=t, Q=Q, integrator=i) for t in (COASTING, BURN) for i in ("rk4", "euler")],
+    ids=["rk4", "euler", "rk4, burning", "euler, burning"],
+)
+
+
+def states(*batch):
+    rng = np.random.default_rng(0)
+    r = rng.normal(size=(*batch, 3))
+    r *= 7.1e6 / np.linalg.norm(r, axis=-1, keepdims=True)
+    v = np.cross(r, rng.normal(size=(*batch, 3)))
+    v *= 7.4e3 / np.linalg.norm(v, axis=-1, keepdims=True)
+    return np.concatenate([r, v], axis=-1)
+
+
+def assert_close(got, wanted, relative):
+    """Relative to the largest element of position or velocity, or of each block of a matrix."""
+    got = np.asarray(got)
+    assert got.shape == wanted.shape
+    halves = (slice(3), slice(3, 6))
+    for i in product(halves, repeat=2 if wanted.shape[-2:] == (6, 6) else 1):
+        part = wanted[..., *i]
+        assert_allclose(got[..., *i], part, rtol=0, atol=relative * np.abs(part).max())
+
+
+@each_motion
+@pytest.mark.parametrize("batch", [(), (3,), (2, 3), (0,)])
+def test_one_integration_gives_what_the_interval_gives(orbit, batch):
+    x = states(*batch)
+    interval = orbit.interval(x)
+    f, F, W = orbit.propagate(x, Q)
+    assert_array_equal(f, interval.path[-1])
+    assert_array_equal(F, interval.F)
+    assert_array_equal(W, interval.accumulate(Q, x))
+    assert_array_equal(orbit.f(x), f)
+    for got, wanted in zip(orbit.transition(x), (f, F), strict=True):
+        assert_array_equal(got, wanted)
+    assert_array_equal(orbit.path(x), interval.path)
+
+
+@each_motion
+@pytest.mark.parametrize("batch", [(), (3,), (2, 3)])
+@pytest.mark.parametrize("k", [0, 1])
+def test_jax_steps_forwards_to_the_same(orbit, batch, k):
+    """In one loop from the first sub-step on, with a traced step, for a burn as for a coast."""
+    x = states(*batch)
+    wanted = orbit.at(k).propagate(x, Q)
+    got = jax.jit(lambda k, x: orbit.at(k).propagate(x, jnp.asarray(Q)))(k, x)
+    for ours, theirs in zip(got, wanted, strict=True):
+        assert_close(ours, theirs, 1e-13)
+    pair = jax.jit(lambda k, x: orbit.at(k).transition(x))(k, x)
+    for ours, theirs in zip(pair, wanted[:2], strict=True):
+        assert_close(ours, theirs, 1e-13)
+    assert_close(jax.jit(lambda k, x: orbit.at(k).f(x))(k, x), wanted[0], 1e-15)
+
+
+def test_jax_takes_a_batch_of_noise():
+    x, many = states(4), Q * np.array([1.0, 4.0, 9.0])[:, None, None, None]
+    orbit = Orbit(thrust=BURN, substeps=50)
+    got = jax.jit(orbit.propagate)(x, many)
+    wanted = orbit.propagate(x, many)
+    assert wanted[2].shape == (3, 4, 6, 6)
+    for ours, theirs in zip(got, wanted, strict=True):
+        assert_close(ours, theirs, 1e-13)
+
+
+def test_what_jax_compiles_does_not_grow_with_the_sub_steps():
+    sizes = [
+        len(str(jax.make_jaxpr(Orbit(thrust=BURN, substeps=n).transition)(states())))
+        for n in (10, 100)
+    ]
+    assert sizes[1] < sizes[0] + 10
+
+
+def test_a_later_interval_burns_at_its_own_time():
+    orbit, x = Orbit(thrust=BURN, Q=Q), states(2)
+    for k in range(3):
+        interval = orbit.interval(x, 100.0 * k)
+        f, F, W = orbit.at(k).propagate(x, Q)
+        assert_array_equal(f, interval.path[-1])
+        assert_array_equal(F, interval.F)
+        assert_array_equal(W, interval.accumulate(Q, x))
+    twice = orbit.at(1).at(1)
+    assert_array_equal(twice.f(x), orbit.at(2).f(x))
+    assert_array_equal(Orbit(thrust=BURN, start=200.0).f(x), twice.f(x))
+
+
+@pytest.mark.parametrize("thrust", [COASTING, Thrust(0.0, ((1, 2),)), Thrust(1.0, ())])
+def test_an_orbit_that_coasts_does_not_count(thrust):
+    orbit = Orbit(thrust=thrust)
+    assert orbit.at(7) is orbit
+
+
+def test_the_paths_of_all_updates_in_one_call():
+    """One time for each of the leading axes, and as from each update alone."""
+    orbit, x, times = Orbit(thrust=BURN), states(4, 3), np.array([0.0, 100.0, 200.0, 300.0])
+    path = orbit.path(x, times)
+    assert path.shape == (100, 4, 3, 6)
+    for k, t in enumerate(times):
+        assert_array_equal(path[:, k], orbit.interval(x[k], float(t)).path)
+        assert_array_equal(path[:, k], orbit.at(k).path(x[k]))
+    compiled = jax.jit(lambda x, t: Orbit(thrust=BURN, substeps=4).path(x, t))(x, times + 28)
+    assert_close(compiled, Orbit(thrust=BURN, substeps=4).path(x, times + 28), 1e-15)
+
+
+def test_strength_takes_arrays_of_times():
+    thrust = Thrust(0.5, ((10, 20), (30, 40)))
+    times = np.array([[0, 10, 19.9, 20], [29, 30, 39.5, 40]])
+    wanted = [[0, 0.5, 0.5, 0], [0, 0.5, 0.5, 0]]
+    assert_array_equal(thrust.strength(times), wanted)
+    assert_array_equal(jax.jit(thrust.strength)(times), wanted)
+    assert_array_equal(COASTING.strength(times), np.zeros((2, 4)))
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_series_is_the_exponential_to_an_order(order):
+    rng = np.random.default_rng(1)
+    A, M = rng.normal(size=(2, 6, 6))
+    terms = [M, A @ M / 10, A @ A @ M / 200, A @ A @ A @ M / 6000]
+    assert_allclose(series(lambda X: A @ X, 0.1, order, M), sum(terms[: order + 1]), rtol=1e-12)
+
+
+def test_a_bad_start_is_refused():
+    with pytest.raises(ValueError, match="start must be a finite number of seconds; found nan"):
+        Orbit(start=np.nan)
