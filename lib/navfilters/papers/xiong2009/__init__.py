@@ -7,6 +7,7 @@ from navfilters.papers.xiong2009.attenuation import (
     smallest_lambda,
 )
 from navfilters.papers.xiong2009.cramer_rao import cramer_rao_bound
+from navfilters.papers.xiong2009.current_noise import CurrentNoise
 from navfilters.papers.xiong2009.error_bounds import (
     Assumptions,
     assumptions,
@@ -15,9 +16,19 @@ from navfilters.papers.xiong2009.error_bounds import (
     theorem_bound,
     theorem_constants,
 )
-from navfilters.papers.xiong2009.experiment import ARCSECOND, ESTIMATORS, VARIANTS, Estimator, Setup
+from navfilters.papers.xiong2009.experiment import (
+    ARCSECOND,
+    ESTIMATORS,
+    VARIANTS,
+    Estimator,
+    Setup,
+    together,
+)
 from navfilters.papers.xiong2009.monte_carlo import (
     errors,
+    errors_each_second,
+    fly,
+    measurements,
     noise,
     position_errors,
     rms_error,
@@ -30,6 +41,7 @@ __all__ = [
     "ESTIMATORS",
     "VARIANTS",
     "Assumptions",
+    "CurrentNoise",
     "Estimator",
     "Setup",
     "Truth",
@@ -38,8 +50,11 @@ __all__ = [
     "contraction",
     "cramer_rao_bound",
     "errors",
+    "errors_each_second",
+    "fly",
     "gamma_limits",
     "lemma_bound",
+    "measurements",
     "noise",
     "position_errors",
     "real_covariance",
@@ -48,5 +63,6 @@ __all__ = [
     "smallest_lambda",
     "theorem_bound",
     "theorem_constants",
+    "together",
     "truth",
 ]
