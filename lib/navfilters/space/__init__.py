@@ -1,5 +1,6 @@
 """Space: frames, quaternions, gravity, orbits and what is measured in them."""
 
+from navfilters.space.earth_fixed_navigation import EarthFixedNavigation
 from navfilters.space.earth_fixed_orbit import EARTH_RATE, EarthFixedOrbit
 from navfilters.space.frames import (
     FLATTENING,
@@ -17,6 +18,7 @@ from navfilters.space.image_measurement import Measurement, NavigationState, Sar
 from navfilters.space.inertial_orbit import CACHED, INTEGRATORS, Orbit
 from navfilters.space.orbit_interval import Interval
 from navfilters.space.osculating_ellipse import perigee_apogee
+from navfilters.space.pose import difference, retract
 from navfilters.space.quaternions import (
     conjugate,
     cross_matrix,
@@ -37,6 +39,7 @@ __all__ = [
     "FLATTENING",
     "INTEGRATORS",
     "SEMI_MAJOR",
+    "EarthFixedNavigation",
     "EarthFixedOrbit",
     "Gravity",
     "Interval",
@@ -50,6 +53,7 @@ __all__ = [
     "body_axes",
     "conjugate",
     "cross_matrix",
+    "difference",
     "east_north_up",
     "ecef_to_geodetic",
     "ellipsoid_intersection",
@@ -60,5 +64,6 @@ __all__ = [
     "normalized",
     "perigee_apogee",
     "product",
+    "retract",
     "rotation_vector",
 ]

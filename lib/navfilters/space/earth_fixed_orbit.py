@@ -148,6 +148,28 @@ class EarthFixedOrbit:
         rest = r.mT @ v - v.mT @ (W @ W @ r + 2 * W @ v)
         return rest + v.mT @ self.gravity.gradient(x[..., :3]) @ r
 
+    def advance(self, x: Array) -> Array:
+        """The state a step later.
+
+        Parameters
+        ----------
+        x : array (..., 6)
+            Earth-fixed position, m, and velocity, m/s.
+
+        Returns
+        -------
+        array (..., 6)
+
+        References
+        ----------
+        pogorelsky2020, Eqs. (10) and (11) for the printed integrator.
+        """
+        h = self.step
+        if self.integrator == "rk4":
+            return runge_kutta(self.derivative, x, h)
+        xp, a, v = x.__array_namespace__(), self.acceleration(x), x[..., 3:]
+        return xp.concat([x[..., :3] + h * v + (h * h / 2) * a, v + h * a], axis=-1)
+
     def path(self, x: Array, steps: int) -> Array:
         """The states that so many steps lead through.
 
@@ -161,17 +183,11 @@ class EarthFixedOrbit:
         -------
         array (steps + 1, ..., 6)
             The first is x.
-
-        References
-        ----------
-        pogorelsky2020, Eqs. (10) and (11) for the printed integrator.
         """
-        xp = x.__array_namespace__()
-        advance = self._printed if self.integrator == "printed" else self._runge_kutta
         path = [x]
         for _ in range(steps):
-            path.append(advance(path[-1]))
-        return xp.stack(path)
+            path.append(self.advance(path[-1]))
+        return x.__array_namespace__().stack(path)
 
     def transitions(self, path: Array) -> Array:
         """F: derivative of each error of a path with respect to that one step before.
@@ -219,14 +235,6 @@ class EarthFixedOrbit:
         for F in self.transitions(path):
             P = F @ P @ F.mT + Q
         return path[-1], (P + P.mT) / 2
-
-    def _runge_kutta(self, x: Array) -> Array:
-        return runge_kutta(self.derivative, x, self.step)
-
-    def _printed(self, x: Array) -> Array:
-        xp, h = x.__array_namespace__(), self.step
-        a, v = self.acceleration(x), x[..., 3:]
-        return xp.concat([x[..., :3] + h * v + (h * h / 2) * a, v + h * a], axis=-1)
 
 
 POSITION, VELOCITY = np.eye(9)[:3], np.eye(9)[3:6]
