@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from naive import covariances, quadratic
 
-from navfilters import Gaussian
-from navfilters.estimators.adaptive import AdaptiveEKF
-from navfilters.estimators.extended import ExtendedKalman
-from navfilters.estimators.robust import AdaptiveRobustEKF, RobustEKF
+from navfilters import Filter, Gaussian
+from navfilters.estimators.adaptive import AdaptiveNoise
+from navfilters.estimators.robust import AdaptiveRobust, Robust
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,10 +24,10 @@ class Swing:
 
 
 WITH_MEMORY = {
-    "EKF": ExtendedKalman(),
-    "REKF": RobustEKF(np.linspace(2.0, 9.0, 6)),
-    "AEKF": AdaptiveEKF(np.linspace(0.1, 0.5, 6), N=4, directions=np.eye(3)[:, :2]),
-    "AREKF": AdaptiveRobustEKF(np.linspace(0.1, 0.9, 6)),
+    "EKF": Filter(),
+    "REKF": Filter(rule=Robust(np.linspace(2.0, 9.0, 6))),
+    "AEKF": Filter(rule=AdaptiveNoise(np.linspace(0.1, 0.5, 6), N=4, directions=np.eye(3)[:, :2])),
+    "AREKF": Filter(rule=AdaptiveRobust(np.linspace(0.1, 0.9, 6))),
 }
 
 
@@ -39,4 +38,4 @@ def moving(steps=9, count=6):
     dynamics = Swing(0.9 * np.linalg.qr(rng.normal(size=(3, 3)))[0], 0.2 * covariances(rng, (), 3))
     z = np.cumsum(rng.normal(size=(steps, count, 2)), axis=0)
     prior = Gaussian(rng.normal(size=(count, 3)), covariances(rng, (count,), 3))
-    return prior, z, (dynamics, sensor), steps
+    return prior, z, sensor, dynamics, steps

@@ -7,6 +7,7 @@ import numpy as np
 
 from navfilters.estimators.rule import Rule, zeros
 from navfilters.numerics import validation
+from navfilters.numerics.matrix_exponential import expm
 from navfilters.numerics.small_matrices import right_divide
 from navfilters.types import Array, Gaussian, Moments
 
@@ -149,24 +150,4 @@ class AdaptiveNoise(Rule):
         ]
         M = right_divide(sum(C[1:]), xp.where(full, C[0], xp.eye(C[0].shape[-1])))
         A = xp.asarray(self.a)[..., None, None] * xp.asarray(self.directions)
-        return _expm(xp.where(full, A @ M @ A.mT / 2, 0.0))
-
-
-def _expm(A: Array) -> Array:
-    """Matrix exponential of a stack: Taylor to degree 14 of A / 2^s, squared s times.
-
-    Each member has its own s, with norm(A) / 2^s at most 1/2. A norm above 1024, where doubles
-    overflow, gives NaN.
-    """
-    xp = A.__array_namespace__()
-    identity = xp.eye(A.shape[-1])
-    norm = xp.max(xp.sum(xp.abs(A), axis=-1), axis=-1)
-    usable = norm <= 1024.0  # and not NaN
-    halvings = xp.ceil(xp.log2(xp.where(usable & (norm > 0.5), norm, 0.5) / 0.5))[..., None, None]
-    scaled = xp.where(usable[..., None, None], A, xp.nan) / 2**halvings
-    E = identity + scaled / 14
-    for j in range(13, 0, -1):
-        E = identity + scaled @ E / j
-    for j in range(11):
-        E = xp.where(j < halvings, E @ E, E)
-    return E
+        return expm(xp.where(full, A @ M @ A.mT / 2, 0.0))

@@ -24,6 +24,14 @@ from navfilters.papers.xiong2009.experiment import (
     Setup,
     together,
 )
+from navfilters.papers.xiong2009.mismatched import (
+    MILD,
+    TURN,
+    WILD,
+    Mismatched,
+    Simulation,
+    simulate,
+)
 from navfilters.papers.xiong2009.monte_carlo import (
     errors,
     errors_each_second,
@@ -39,11 +47,16 @@ from navfilters.papers.xiong2009.true_flight import Truth, truth
 __all__ = [
     "ARCSECOND",
     "ESTIMATORS",
+    "MILD",
+    "TURN",
     "VARIANTS",
+    "WILD",
     "Assumptions",
     "CurrentNoise",
     "Estimator",
+    "Mismatched",
     "Setup",
+    "Simulation",
     "Truth",
     "assumptions",
     "attenuation_ratio",
@@ -60,6 +73,7 @@ __all__ = [
     "real_covariance",
     "rms_error",
     "root_mean_square",
+    "simulate",
     "smallest_lambda",
     "theorem_bound",
     "theorem_constants",
