@@ -56,7 +56,7 @@ OPTIONS = {
     "lam": (1.5, lambda x: AdaptiveRobustEKF(lam=x).lam * 1.0),
     "step": (0.5, lambda x: Orbit(step=x, substeps=2).interval(ORBIT).transition(ORBIT)[0]),
     "rate": (0.5, lambda x: EarthFixedOrbit(rate=x).acceleration(ORBIT)),
-    "k": (2.5, lambda x: coverage(np.ones((5, 2)), np.eye(2), x).expected),
+    "k": (2.5, lambda x: coverage(np.ones((5, 2)), np.eye(2), x, runs_axis=0).expected),
     "confidence": (0.875, lambda x: chi_square_band(3, 4, x)),
     "dof": (3, lambda x: chi_square_band(x)),
 }

@@ -191,7 +191,7 @@ DOORS = {
     "first_indefinite": ("cov", [COV, COV], first_indefinite),
     "linear_limit, z": ("z", Z, lambda a: FILTERS["EKF"].linear_limit(ALONE, a, Linear(COV, R))),
     "nees, error": ("error", MEAN, lambda a: nees(a, COV)),
-    "mean_nees, cov": ("cov", [COV, COV], lambda a: mean_nees([MEAN, Z], a)),
+    "mean_nees, cov": ("cov", [COV, COV], lambda a: mean_nees([MEAN, Z], a, runs_axis=0)),
 }
 
 

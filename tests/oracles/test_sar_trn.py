@@ -25,8 +25,8 @@ def both(case, updates, seed):
     }
     ours = pogorelsky2020.monte_carlo(setup, updates, runs=[7], seed=seed)
     return (
-        ours.errors[0, : updates + 1],
-        ours.covariances[0, : updates + 1],
+        ours.errors[: updates + 1, 0],
+        ours.covariances[: updates + 1, 0],
         *oracle.run(case, updates, drawn),
     )
 

@@ -141,6 +141,20 @@ def test_damage_and_other_arguments_are_refused(whole, tmp_path):
     assert contents(tmp_path) == contents(whole[0])
 
 
+def test_a_folder_of_the_older_axis_order_is_refused(whole, tmp_path):
+    """Runs came first; told apart by the format and not by the shapes, which may be equal."""
+    for name, content in contents(whole[0]).items():
+        (tmp_path / name).write_bytes(content)
+    with np.load(whole[0] / "TC-1.npz") as stored:
+        arrays = dict(stored)
+    arrays["job"] = np.array(str(arrays["job"]).replace("(2, ", "(", 1))
+    for name in ("errors", "covariances", "innovations", "S"):
+        arrays[name] = arrays[name].swapaxes(0, 1)
+    np.savez(tmp_path / "TC-1.npz", **arrays)
+    with pytest.raises(ValueError, match=r"TC-1.npz belongs to another campaign"):
+        campaign(tmp_path, RUNS, DIRECT, imaging=SMALL, progress=Work())
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

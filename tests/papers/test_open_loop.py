@@ -14,13 +14,20 @@ from navfilters.estimators.multiplicative import MekfState, mekf_update
 from navfilters.papers import pogorelsky2020
 from navfilters.papers.pogorelsky2020 import __main__ as command
 from navfilters.papers.pogorelsky2020.experiment import CASES, Setup
+from navfilters.papers.pogorelsky2020.final_nees import final_nees, nees_line
+from navfilters.papers.pogorelsky2020.linearised import FixedModel, linearised_flight
 from navfilters.papers.pogorelsky2020.noise_draws import misalignment, noise
-from navfilters.papers.pogorelsky2020.open_loop import SimulatedImages, monte_carlo
+from navfilters.papers.pogorelsky2020.open_loop import (
+    SimulatedImages,
+    estimation_error,
+    monte_carlo,
+    simulate_images,
+)
 from navfilters.papers.pogorelsky2020.true_flight import _attitude, _circular, initial_state, truth
 from navfilters.runs.consistency import mean_nees, sample_deviation
 from navfilters.space.frames import ecef_to_geodetic, ellipsoid_intersection
 from navfilters.space.image_measurement import Measurement
-from navfilters.space.quaternions import conjugate, product, rotation_vector
+from navfilters.space.quaternions import rotation_vector
 
 R0 = np.array([-1108465.150, -6100044.949, 3397134.666])
 V0 = np.array([-1003.9419331, 3801.3289491, 6498.2536689])
@@ -119,7 +126,7 @@ def test_attitude_definitions():
 )
 def test_deviations_at_600_s(results, case, predicted, fell):
     result = results[case]
-    spread = sample_deviation(result.errors[:, -1], result.covariances[:, -1])
+    spread = sample_deviation(result.errors[-1], result.covariances[-1], runs_axis=0)
     assert_allclose(spread.predicted[:3], predicted, rtol=0.03)
     assert_allclose(100 * (1 - spread.predicted[:2] / 1000), fell, atol=0.3)
     inside = (spread.low < spread.predicted) & (spread.predicted < spread.high)
@@ -130,7 +137,8 @@ def test_deviations_at_600_s(results, case, predicted, fell):
 
 def test_only_the_second_case_is_consistent_by_nees(results):
     one, two = (
-        mean_nees(results[c].errors[:, -1], results[c].covariances[:, -1]) for c in ("TC-1", "TC-2")
+        mean_nees(results[c].errors[-1], results[c].covariances[-1], runs_axis=0)
+        for c in ("TC-1", "TC-2")
     )
     assert 12 < one.mean < 20  # about 16
     assert two.low < two.mean < two.high
@@ -140,42 +148,34 @@ def test_rotation_about_the_boresight_is_not_seen(results):
     """The third misalignment keeps its prior and the small random walk."""
     for case, prior in (("TC-1", 0.1), ("TC-2", 0.01)):
         deviation = np.sqrt(np.diagonal(results[case].covariances, axis1=-2, axis2=-1))
-        last = np.rad2deg(deviation[:, -1, 6:])
+        last = np.rad2deg(deviation[-1, :, 6:])
         assert_allclose(last[:, 2], prior, rtol=0.02)
         assert (last[:, 0] < 0.25 * prior).all()
 
 
 def test_the_first_case_needs_the_underweighting_and_the_second_does_not(results):
     free = monte_carlo(replace(CASES["TC-1"], underweighting=0.0))
-    spread = sample_deviation(free.errors[:, -1], free.covariances[:, -1])
+    spread = sample_deviation(free.errors[-1], free.covariances[-1], runs_axis=0)
     assert spread.predicted[1] < spread.low[1]  # y
-    held = sample_deviation(results["TC-1"].errors[:, -1], results["TC-1"].covariances[:, -1])
+    held = sample_deviation(
+        results["TC-1"].errors[-1], results["TC-1"].covariances[-1], runs_axis=0
+    )
     assert held.low[1] < held.predicted[1]
 
 
 def test_the_curved_measurement_is_what_breaks_the_first_case():
     """With residuals that are linear in the error, about the estimate, the same filter passes."""
-    setup, count = CASES["TC-1"], iter(range(1, 73))
-    flight, q_true = truth(), misalignment(setup, noise(60, 72).walk)
+    images = simulate_images("TC-1", 60)
 
-    class Straight:
-        def __init__(self, model, k):
-            self.model, self.k = model, k
+    def straight(state, told, model, **options):
+        image, true = told
+        _, H, R = model.linearize(state, image)
+        error = estimation_error(true, state)
+        y = model.linearize(true, image)[0] + (H @ error[..., None])[..., 0]
+        return mekf_update(state, image, FixedModel(y, H, R), **options)
 
-        def linearize(self, state, measurement):
-            x, q = flight.x[self.k], q_true[:, self.k]
-            here = MekfState(x[:3], x[3:], q, state.P)
-            from_truth = self.model.linearize(here, measurement)[0]
-            _, H, R = self.model.linearize(state, measurement)
-            turned = rotation_vector(product(q, conjugate(state.q_mu)))
-            error = np.concatenate([x[:3] - state.r, x[3:] - state.v, turned], axis=-1)
-            return from_truth + (H @ error[..., None])[..., 0], H, R
-
-    def straight(state, measurement, model, **options):
-        return mekf_update(state, measurement, Straight(model, next(count)), **options)
-
-    result = monte_carlo(setup, runs=60, update=straight)
-    total = mean_nees(result.errors[:, -1], result.covariances[:, -1])
+    result = monte_carlo("TC-1", runs=60, measure=images.with_truth, update=straight)
+    total = mean_nees(result.errors[-1], result.covariances[-1], runs_axis=0)
     assert total.low < total.mean < total.high
 
 
@@ -183,26 +183,24 @@ def test_three_updates_and_a_coast():
     """8.33, 16.67 and 25 s, then to 41.67 s; the same first three as in the long flight."""
     few, many = monte_carlo("TC-1", 3, runs=4), monte_carlo("TC-1", 6, runs=4)
     assert_allclose(few.times, [0, 25 / 3, 50 / 3, 25, 125 / 3])
-    assert_array_equal(few.errors[:, :4], many.errors[:, :4])
-    assert_array_equal(few.covariances[:, :4], many.covariances[:, :4])
-    assert few.innovations.shape == (4, 3, 4)
-    grown = np.diagonal(few.covariances[:, 4] - few.covariances[:, 3], axis1=-2, axis2=-1)
+    assert_array_equal(few.errors[:4], many.errors[:4])
+    assert_array_equal(few.covariances[:4], many.covariances[:4])
+    assert few.innovations.shape == (3, 4, 4)
+    grown = np.diagonal(few.covariances[4] - few.covariances[3], axis1=-2, axis2=-1)
     assert (grown[:, 6:] > 0).all()
     assert_allclose(grown[:, 6:], 3.4e-13 * 50 / 3, rtol=1e-3)
 
 
 def test_first_errors_are_the_drawn_ones():
     result, drawn = monte_carlo("TC-2", 1, runs=3, seed=5), noise(3, 1, 5)
-    assert_allclose(
-        result.errors[:, 0], np.sqrt(np.diag(CASES["TC-2"].P0)) * drawn.first, rtol=1e-6
-    )
-    assert_array_equal(result.covariances[:, 0], np.broadcast_to(CASES["TC-2"].P0, (3, 9, 9)))
+    assert_allclose(result.errors[0], np.sqrt(np.diag(CASES["TC-2"].P0)) * drawn.first, rtol=1e-6)
+    assert_array_equal(result.covariances[0], np.broadcast_to(CASES["TC-2"].P0, (3, 9, 9)))
 
 
 def test_a_run_gives_the_same_digits_in_any_company():
     among, alone = monte_carlo("TC-1", 4, runs=9), monte_carlo("TC-1", 4, runs=[7])
     for name in ("errors", "covariances", "innovations", "S"):
-        assert_array_equal(getattr(among, name)[7], getattr(alone, name)[0])
+        assert_array_equal(getattr(among, name)[:, 7], getattr(alone, name)[:, 0])
     assert (monte_carlo("TC-1", 4, runs=[7], seed=1).errors != alone.errors).any()
 
 
@@ -257,14 +255,14 @@ def test_a_plain_loop_over_one_run():
         dx, A = K @ y, np.eye(9) - K @ H
         x, P = x + dx[:6], A @ P @ A.T + K @ R @ K.T
         attitude = attitude * Rotation.from_rotvec(dx[6:])
-        assert_allclose(result.innovations[0, k - 1] / scale, y / scale, atol=1e-6)
-        assert_allclose(result.errors[0, k, :6], flight.x[k] - x, rtol=1e-6, atol=1e-5)
+        assert_allclose(result.innovations[k - 1, 0] / scale, y / scale, atol=1e-6)
+        assert_allclose(result.errors[k, 0, :6], flight.x[k] - x, rtol=1e-6, atol=1e-5)
         true = Rotation.from_quat(q_true[0, k])
         turned = (attitude.inv() * true).as_rotvec()
-        assert_allclose(result.errors[0, k, 6:], turned, rtol=0, atol=1e-10)
+        assert_allclose(result.errors[k, 0, 6:], turned, rtol=0, atol=1e-10)
     deviation = np.sqrt(np.diag(P))
     assert_allclose(
-        result.covariances[0, -1] / deviation / deviation[:, None],
+        result.covariances[-1, 0] / deviation / deviation[:, None],
         P / deviation / deviation[:, None],
         atol=1e-5,
     )
@@ -281,12 +279,12 @@ def test_images_that_are_not_matched_leave_dead_reckoning():
         return Measurement(np.where(blind[:, None], np.nan, seen.r_f), *seen[1:])
 
     got, wanted = monte_carlo(setup, 5, 3, measure=lost), monte_carlo(setup, 5, 3)
-    assert_array_equal(got.errors[[0, 2]], wanted.errors[[0, 2]])
-    assert np.isnan(got.innovations[1]).any(axis=-1).all()
-    x = flight.x[0] - got.errors[1, 0, :6]
+    assert_array_equal(got.errors[:, [0, 2]], wanted.errors[:, [0, 2]])
+    assert np.isnan(got.innovations[:, 1]).any(axis=-1).all()
+    x = flight.x[0] - got.errors[0, 1, :6]
     x, P = setup.orbit.propagate(x, setup.P0, 50)
-    assert_allclose(got.errors[1, -1, :6], flight.x[5] - x, atol=1e-6)
-    assert_allclose(got.covariances[1, -1], P, rtol=1e-9, atol=1e-6)
+    assert_allclose(got.errors[-1, 1, :6], flight.x[5] - x, atol=1e-6)
+    assert_allclose(got.covariances[-1, 1], P, rtol=1e-9, atol=1e-6)
 
 
 def test_options_reach_the_filter():
@@ -306,7 +304,7 @@ def test_options_reach_the_filter():
         {"walk": False},
     ):
         other = monte_carlo(replace(CASES["TC-1"], **change), 3, 2)
-        assert (other.errors[:, 1:] != base.errors[:, 1:]).any(), change
+        assert (other.errors[1:] != base.errors[1:]).any(), change
     far = monte_carlo(replace(CASES["TC-1"], gamma=1e9), 3, 2)
     none = monte_carlo(replace(CASES["TC-1"], underweighting=0.0), 3, 2)
     assert_array_equal(far.errors, none.errors)
@@ -379,3 +377,60 @@ REFUSED = {
 def test_bad_input_is_refused_by_name(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_simulated_images_are_those_of_the_runs():
+    """With the truth beside each of them."""
+    setup, flight = CASES["TC-2"], truth(CASES["TC-2"], 5)
+    images = simulate_images("TC-2", 3, 4, flight=flight)
+    got = monte_carlo("TC-2", 2, 3, 4, flight=flight, measure=images)
+    assert_array_equal(got.errors, monte_carlo("TC-2", 2, 3, 4, flight=flight).errors)
+    drawn = noise(3, 5, 4)
+    wanted = SimulatedImages(setup, flight, misalignment(setup, drawn.walk), drawn)(2, None)
+    state = MekfState(np.zeros((3, 3)), np.zeros((3, 3)), images.q_mu[:, 0], np.eye(9))
+    image, true = images.with_truth(2, state)
+    assert_array_equal(image.r_f, wanted.r_f)
+    assert_array_equal(true.r, flight.x[2, :3])
+    assert_array_equal(true.q_mu, images.q_mu[:, 2])
+    error = estimation_error(true, state)
+    assert_array_equal(error[:, :6], np.broadcast_to(flight.x[2], (3, 6)))
+    assert (np.abs(error[:, 6:]) < 1e-4).all()
+
+
+def test_the_flight_linearised_is_the_filters_own_along_the_truth():
+    """Its covariance is that of a run without errors, and its transitions carry small ones."""
+    setup, flight = CASES["TC-1"], truth(CASES["TC-1"], 12)
+    legs, P = linearised_flight(setup, flight, 12)
+    perfect = replace(
+        simulate_images(setup, 1, flight=flight), q_mu=np.tile([0, 0, 0, 1.0], (1, 13, 1))
+    )
+    zero = perfect.noise._replace(**{n: 0 * v for n, v in perfect.noise._asdict().items()})
+    perfect = replace(perfect, noise=zero)
+    state = MekfState(flight.x[0, :3], flight.x[0, 3:], perfect.q_mu[0, 0], setup.P0)
+    for k, leg in enumerate(legs, start=1):
+        x, before = setup.orbit.propagate(flight.x[k - 1], state.P, setup.steps)
+        assert_allclose(leg.F @ state.P @ leg.F.T + leg.Q, before, rtol=1e-12, atol=1e-12)
+        model = replace(setup.geometry, T_e_b=flight.T_e_b[k])
+        b = 0.2 if k <= 10 else 0.0
+        state = MekfState(x[:3], x[3:], perfect.q_mu[0, 0], before)
+        assert_allclose(leg.extra, b * leg.H @ before @ leg.H.T)
+        state = mekf_update(state, perfect(k, None), model, underweighting=b).state
+        state = MekfState(flight.x[k, :3], flight.x[k, 3:], perfect.q_mu[0, 0], state.P[0])
+    assert_allclose(P, state.P, rtol=1e-5, atol=1e-9)
+    nudge = np.array([10.0, 0, 0, 0, 0, 0.1])
+    moved = setup.orbit.path(flight.x[0] + nudge, setup.steps)[-1] - flight.x[1]
+    assert_allclose(legs[0].F[:6, :6] @ nudge, moved, atol=1e-3)
+
+
+@pytest.mark.parametrize("images", [0, 6])
+def test_a_flight_is_linearised_as_far_as_it_goes(images):
+    with pytest.raises(ValueError, match="images must be"):
+        linearised_flight(Setup(), truth(Setup(), 5), images)
+
+
+def test_nees_at_the_end_in_numbers_and_in_words(results):
+    values = final_nees(results["TC-1"])
+    assert values.shape == (100,)
+    total = mean_nees(results["TC-1"].errors, results["TC-1"].covariances, runs_axis=1)
+    assert_allclose(values.mean(), total.mean[-1])
+    assert nees_line(np.array([1.0, 9.0, 9.0, 41.0])) == " 15.0 ± 15.1, median  9.0, 25.0 %"

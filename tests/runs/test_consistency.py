@@ -77,25 +77,25 @@ def test_chi_square_band():
 
 
 def test_mean_nees_of_an_honest_and_of_a_confident_filter():
-    result = mean_nees(*honest(), 0.999)
+    result = mean_nees(*honest(), runs_axis=0, confidence=0.999)
     assert_allclose(result.mean, nees(*honest()).mean(axis=0))
     assert (result.low < result.mean).all()
     assert (result.mean < result.high).all()
     assert_array_equal(result.runs, 400)
-    assert (mean_nees(*honest(factor=1.2)).mean > result.high).all()
-    assert (mean_nees(*honest(factor=0.8)).mean < result.low).all()
+    assert (mean_nees(*honest(factor=1.2), runs_axis=0).mean > result.high).all()
+    assert (mean_nees(*honest(factor=0.8), runs_axis=0).mean < result.low).all()
 
 
 def test_the_bands_hold_as_often_as_they_say():
     """Over 400 times at 90 percent, each test is passed about 360 times."""
     error, P = honest(50, 400, 2, seed=2)
-    total = mean_nees(error, P, 0.9)
+    total = mean_nees(error, P, runs_axis=0, confidence=0.9)
     passed = (total.low <= total.mean) & (total.mean <= total.high)
     assert 340 <= passed.sum() <= 380
     error = np.random.default_rng(3).normal(size=(50, 400, 1)) * 7
-    spread = sample_deviation(error, np.full((50, 400, 1, 1), 49.0), 0.9)
+    spread = sample_deviation(error, np.full((50, 400, 1, 1), 49.0), runs_axis=0, confidence=0.9)
     assert 340 <= ((spread.low <= 7) & (spread.high >= 7)).sum() <= 380
-    within = coverage(error, np.full((50, 400, 1, 1), 49.0), 1.0, 0.9)
+    within = coverage(error, np.full((50, 400, 1, 1), 49.0), 1.0, runs_axis=0, confidence=0.9)
     held = (within.low <= within.expected) & (within.expected <= within.high)
     assert held.sum() >= 355  # Clopper and Pearson promise at least
 
@@ -106,14 +106,14 @@ def test_a_wrong_combination_hides_from_the_axes_and_not_from_nees():
     true, believed = np.array([[1, 0.9], [0.9, 1]]), np.array([[1, -0.9], [-0.9, 1]])
     error = rng.multivariate_normal(np.zeros(2), true, 200)
     P = np.broadcast_to(believed, (200, 2, 2))
-    spread = sample_deviation(error, P)
+    spread = sample_deviation(error, P, runs_axis=0)
     assert ((spread.low < spread.predicted) & (spread.predicted < spread.high)).all()
-    assert mean_nees(error, P).mean > 5
+    assert mean_nees(error, P, runs_axis=0).mean > 5
 
 
 def test_sample_deviation_in_a_plain_loop():
     error, P = honest(30)
-    result = sample_deviation(error, P)
+    result = sample_deviation(error, P, runs_axis=0)
     assert_allclose(result.mean, error.mean(axis=0))
     assert_allclose(result.sample, error.std(axis=0, ddof=1))
     mean_variance = np.mean([[np.diag(p) for p in run] for run in P], axis=0)
@@ -125,7 +125,7 @@ def test_sample_deviation_in_a_plain_loop():
 
 def test_coverage_is_clopper_and_pearsons():
     error, P = honest(60)
-    result = coverage(error, P, 2.0)
+    result = coverage(error, P, 2.0, runs_axis=0)
     deviation = np.sqrt(np.diagonal(P, axis1=-2, axis2=-1))
     hits = np.sum(np.abs(error) <= 2 * deviation, axis=0)
     assert_allclose(result.fraction, hits / 60)
@@ -138,7 +138,7 @@ def test_coverage_is_clopper_and_pearsons():
 @pytest.mark.parametrize(("scale", "fraction"), [(0.0, 1.0), (1e9, 0.0)])
 def test_coverage_of_all_and_of_none(scale, fraction):
     error, P = honest(10)
-    result = coverage(scale * error, P)
+    result = coverage(scale * error, P, runs_axis=0)
     assert_array_equal(result.fraction, fraction)
     interval = stats.binomtest(round(10 * fraction), 10).proportion_ci(0.95, "exact")
     assert_allclose([result.low[0, 0], result.high[0, 0]], interval, rtol=1e-12)
@@ -147,9 +147,9 @@ def test_coverage_of_all_and_of_none(scale, fraction):
 @pytest.mark.parametrize("judge", [mean_nees, sample_deviation, coverage])
 def test_runs_that_failed_are_left_out_and_counted(judge):
     error, P = honest(20)
-    wanted = judge(np.delete(error, [3, 7], 0), np.delete(P, [3, 7], 0))
+    wanted = judge(np.delete(error, [3, 7], 0), np.delete(P, [3, 7], 0), runs_axis=0)
     error[3, 1], P[7, 1] = np.nan, np.nan
-    got = judge(error, P)
+    got = judge(error, P, runs_axis=0)
     assert_array_equal(got.runs, [20, 18, 20])
     for a, b in zip(got, wanted, strict=True):
         if np.ndim(a):
@@ -159,10 +159,47 @@ def test_runs_that_failed_are_left_out_and_counted(judge):
 @pytest.mark.parametrize("judge", [mean_nees, sample_deviation, coverage])
 def test_one_covariance_may_serve_all_runs(judge):
     error, P = honest(20, 3, 2)
-    got = judge(error, P[:1, :1])
-    wanted = judge(error, np.broadcast_to(P[:1, :1], P.shape))
+    got = judge(error, P[:1, :1], runs_axis=0)
+    wanted = judge(error, np.broadcast_to(P[:1, :1], P.shape), runs_axis=0)
     for a, b in zip(got, wanted, strict=True):
         assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("judge", [mean_nees, sample_deviation, coverage])
+@pytest.mark.parametrize("axis", [1, -2])
+def test_any_axis_may_be_that_of_the_runs(judge, axis):
+    """A history, (times, runs, n), is averaged over its runs and never over time."""
+    error, P = honest(20)
+    got = judge(error.swapaxes(0, 1), P.swapaxes(0, 1), runs_axis=axis)
+    for a, b in zip(got, judge(error, P, runs_axis=0), strict=True):
+        assert_allclose(a, b, rtol=1e-13)
+
+
+@pytest.mark.parametrize("judge", [mean_nees, sample_deviation, coverage])
+def test_a_covariance_of_each_time_serves_all_runs(judge):
+    """As of a filter whose P does not depend on what it measures: aligned from the end."""
+    error, P = honest(20, 3, 2)
+    error, P = error.swapaxes(0, 1), P[0][:, None]
+    got = judge(error, P, runs_axis=1)
+    wanted = judge(error, np.broadcast_to(P, (3, 20, 2, 2)), runs_axis=1)
+    for a, b in zip(got, wanted, strict=True):
+        assert_array_equal(a, b)
+
+
+def test_mean_nis_of_a_filter_that_is_right():
+    """Innovations and S in place of errors and covariances; NaN where nothing was measured."""
+    innovation, S = honest(400, 5, 2)
+    innovation[:100, 2] = np.nan
+    result = mean_nees(innovation, S, runs_axis=0, confidence=0.999)
+    assert_array_equal(result.runs, [400, 400, 300, 400, 400])
+    assert ((result.low < result.mean) & (result.mean < result.high)).all()
+    assert_allclose(result.mean, np.nanmean(nis(innovation, S), axis=0))
+
+
+@pytest.mark.parametrize("judge", [mean_nees, sample_deviation, coverage])
+def test_the_axis_of_the_runs_must_be_named(judge):
+    with pytest.raises(TypeError, match="runs_axis"):
+        judge(*honest(5))
 
 
 E, P = honest(5)
@@ -174,15 +211,47 @@ REFUSED = {
     "dof": (lambda: chi_square_band(0), "dof and runs must be at least 1; found 0 and 1"),
     "runs": (lambda: chi_square_band(9, 0), "dof and runs must be at least 1; found 9 and 0"),
     "shapes": (
-        lambda: mean_nees(E, P[..., :2]),
+        lambda: mean_nees(E, P[..., :2], runs_axis=0),
         r"error and cov must have shapes .*found \(5, 3, 4",
     ),
-    "no runs axis": (lambda: coverage(E[0, 0], P[0, 0]), r"\(runs, ..., n\).*found \(4,\)"),
-    "batch": (lambda: mean_nees(E, P[:, :2]), "batch.*error .5, 3., cov .5, 2."),
-    "all failed": (lambda: mean_nees(E * np.nan, P), "at least 1 finite runs; found 0"),
-    "one run": (lambda: sample_deviation(E[:1], P[:1]), "at least 2 finite runs; found 1"),
-    "none": (lambda: coverage(E[:0], P[:0]), "at least 1 finite runs; found 0"),
-    "k": (lambda: coverage(E, P, -1.0), "k must be a positive number of deviations; found -1"),
+    "no runs axis": (
+        lambda: coverage(E[0, 0], P[0, 0], runs_axis=0),
+        r"\(..., n\).*an axis of runs; found \(4,\)",
+    ),
+    "core axis": (
+        lambda: mean_nees(E, P, runs_axis=2),
+        r"runs_axis must name an axis of error before its last, 0 to 1; found 2, and .*5, 3, 4",
+    ),
+    "core axis from the end": (
+        lambda: coverage(E, P, runs_axis=-1),
+        r"before its last, 0 to 1; found -1, and error of shape \(5, 3, 4\)",
+    ),
+    "no such axis": (
+        lambda: sample_deviation(E, P, runs_axis=3),
+        r"before its last, 0 to 1; found 3, and error of shape \(5, 3, 4\)",
+    ),
+    "far below": (
+        lambda: mean_nees(E, P, runs_axis=-4),
+        r"before its last, 0 to 1; found -4, and error of shape",
+    ),
+    "no integer": (
+        lambda: mean_nees(E, P, runs_axis=0.0),
+        r"before its last, 0 to 1; found 0.0, and error of shape",
+    ),
+    "batch": (lambda: mean_nees(E, P[:, :2], runs_axis=0), "batch.*error .5, 3., cov .5, 2."),
+    "all failed": (
+        lambda: mean_nees(E * np.nan, P, runs_axis=0),
+        "at least 1 finite runs; found 0",
+    ),
+    "one run": (
+        lambda: sample_deviation(E[:1], P[:1], runs_axis=0),
+        "at least 2 finite runs; found 1",
+    ),
+    "none": (lambda: coverage(E[:0], P[:0], runs_axis=0), "at least 1 finite runs; found 0"),
+    "k": (
+        lambda: coverage(E, P, -1.0, runs_axis=0),
+        "k must be a positive number of deviations; found -1",
+    ),
 }
 
 

@@ -11,7 +11,7 @@ from navfilters.estimators.prediction import predict_linearized
 from navfilters.estimators.state import FilterState
 from navfilters.estimators.update import absent
 from navfilters.numerics import validation
-from navfilters.types import Array, Dynamics, Gaussian, MeasurementModel
+from navfilters.types import Array, Gaussian
 
 
 @dataclass(frozen=True)
@@ -30,15 +30,13 @@ class Memoryless:
         """The state before any step."""
         return first_state(prior)
 
-    def predict(self, state: FilterState, dynamics: Dynamics, k: Array = 0) -> FilterState:
+    def predict(self, state: FilterState, dynamics: Any, k: Array = 0) -> FilterState:
         """The state one transition later, by :func:`predict_linearized`."""
         dynamics = model_parts.at(dynamics, k)
         Q = validation.given("dynamics.Q", dynamics.Q)
         return state._replace(estimate=predict_linearized(state.estimate, dynamics, Q))
 
-    def update(
-        self, state: FilterState, z: Array, sensor: MeasurementModel, k: Array = 0
-    ) -> FilterState:
+    def update(self, state: FilterState, z: Array, sensor: Any, k: Array = 0) -> FilterState:
         """The state after a measurement; as it was where anything of z is NaN."""
         z, sensor = seen(validation.given("z", z), sensor, k)
         gone, estimate = absent(z), self.function(state.estimate, z, sensor)

@@ -34,7 +34,7 @@ from navfilters.estimators.update import (
 )
 from navfilters.estimators.variants import Variant, unchanged
 from navfilters.numerics import validation
-from navfilters.types import Array, Dynamics, Gaussian, MeasurementModel, Moments
+from navfilters.types import Array, Gaussian, MeasurementModel, Moments
 
 PREDICTIONS = {second_order: predict_second_order, unscented: predict_unscented}
 """How the moments functions predict a state; all others linearise."""
@@ -106,9 +106,11 @@ class Filter:
                 f"{type(self.rule).__name__}"
             )
         self._know(options)
-        moments = self.moments(_given(prior), model, **_accepted(self.moments, options))
+        prior, z = _given(prior), validation.given("z", z)
+        moments = self.moments(prior, model, **_accepted(self.moments, options))
         changed, moments = self.variant(prior, model, moments, **_accepted(self.variant, options))
-        return kalman_update(changed, z, moments, form=self.form, model=model)
+        updated = kalman_update(changed, z, moments, form=self.form, model=model)
+        return _kept(absent(z), prior, updated)
 
     @property
     def options(self) -> tuple[str, ...]:
@@ -160,7 +162,7 @@ class Filter:
         """
         return first_state(prior, self.rule)
 
-    def predict(self, state: FilterState, dynamics: Dynamics, k: Array = 0) -> FilterState:
+    def predict(self, state: FilterState, dynamics: Any, k: Array = 0) -> FilterState:
         """The state one transition later.
 
         Parameters
@@ -186,9 +188,7 @@ class Filter:
             estimate=predict(state.estimate, dynamics, Q, **options), memory=memory
         )
 
-    def update(
-        self, state: FilterState, z: Array, sensor: MeasurementModel, k: Array = 0
-    ) -> FilterState:
+    def update(self, state: FilterState, z: Array, sensor: Any, k: Array = 0) -> FilterState:
         """The state after a measurement.
 
         Parameters
@@ -211,14 +211,16 @@ class Filter:
             prior, memory, moments = self._ruled(state, z, sensor, gone)
         if moments is None:
             moments = self.moments(prior, sensor)
-        prior, moments = self.variant(prior, sensor, moments)
+        variant = model_parts.at(self.variant, k)
+        prior, moments = variant(prior, sensor, moments)
         fit(prior, z, moments)
         y = innovation(z, moments, sensor)
         estimate = correct(prior, y, moments, self.form, sensor, gone)
+        estimate = _kept(gone, state.estimate, estimate)
         return FilterState(estimate, missed(state, gone), memory, y, moments.P_zz)
 
     def _ruled(
-        self, state: FilterState, z: Array, sensor: MeasurementModel, gone: Array | None
+        self, state: FilterState, z: Array, sensor: Any, gone: Array | None
     ) -> tuple[Gaussian, Any, Moments | None]:
         """Prior and memory by the rule, which does not act where not all was measured."""
         assert self.rule is not None
@@ -236,8 +238,8 @@ class Filter:
         self,
         state: FilterState,
         z: Array,
-        sensor: MeasurementModel,
-        dynamics: Dynamics | None = None,
+        sensor: Any,
+        dynamics: Any = None,
         k: Array = 0,
     ) -> FilterState:
         """A prediction, where there are dynamics, and an update.
@@ -280,8 +282,9 @@ class Filter:
         z, prior = validation.given("z", z), _given(prior)
         H, R = model.jacobian(prior.mean), model_parts.noise(model, prior.mean)
         P = prior.cov if self.rule is None else self.rule.limit(prior.cov)
-        given = getattr(self.variant, "keywords", {}) | _accepted(self.variant, options)
-        P, R = LIMITS[getattr(self.variant, "func", self.variant)](P, H, R, **given)
+        variant = model_parts.at(self.variant, 0)
+        given = getattr(variant, "keywords", {}) | _accepted(variant, options)
+        P, R = LIMITS[getattr(variant, "func", variant)](P, H, R, **given)
         weight = H.mT @ np.linalg.inv(R)
         cov = np.linalg.inv(np.linalg.inv(P) + weight @ H)
         residual = z - (H @ prior.mean[..., None])[..., 0]
@@ -301,7 +304,7 @@ def first_state(prior: Gaussian, rule: Rule | None = None) -> FilterState:
     return FilterState(prior, zeros(prior), None if rule is None else rule.init(prior))
 
 
-def seen(z: Array, sensor: MeasurementModel, k: Array) -> tuple[Array, MeasurementModel]:
+def seen(z: Array, sensor: Any, k: Array) -> tuple[Array, MeasurementModel]:
     """What is compared with the sensor of step k, and that sensor."""
     sensor = model_parts.at(sensor, k)
     return sensor.given(z) if hasattr(sensor, "given") else (z, sensor)
@@ -312,6 +315,13 @@ def missed(state: FilterState, gone: Array | None) -> Array:
     if gone is None:
         return state.missed
     return state.missed + gone.__array_namespace__().all(gone, axis=-1)
+
+
+def _kept(gone: Array | None, before: Gaussian, after: Gaussian) -> Gaussian:
+    """The estimate as it was in the members of which nothing was measured."""
+    if gone is None:
+        return after
+    return keep(gone.__array_namespace__().all(gone, axis=-1), before, after)
 
 
 def keep(some: Array, before: Any, after: Any) -> Any:

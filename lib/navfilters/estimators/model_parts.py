@@ -1,5 +1,6 @@
 """What a filter asks of a model, and what it takes where the model does not say."""
 
+from collections.abc import Callable
 from typing import Any
 
 from navfilters.numerics import validation
@@ -43,7 +44,7 @@ def jacobian(model: MeasurementModel, x: Array) -> Array:
     """H = dh/dx, (..., m, n): the model's own, or by complex step."""
     if hasattr(model, "jacobian"):
         return model.jacobian(x)
-    return first_derivative(model.h, x, "model.h")
+    return first_derivative(*by_error(model, model.h, x), "model.h")
 
 
 def hessian(model: MeasurementModel, x: Array) -> Array:
@@ -51,8 +52,15 @@ def hessian(model: MeasurementModel, x: Array) -> Array:
     if hasattr(model, "hessian"):
         return model.hessian(x)
     if hasattr(model, "jacobian"):
-        return first_derivative(model.jacobian, x, "model.jacobian")
-    return second_derivative(model.h, x, "model.h")
+        return first_derivative(*by_error(model, model.jacobian, x), "model.jacobian")
+    return second_derivative(*by_error(model, model.h, x), "model.h")
+
+
+def by_error(model: Any, function: Callable, x: Array) -> tuple[Callable, Array]:
+    """A function of the state as one of its error, and where that is none."""
+    if not hasattr(model, "retract"):
+        return function, x
+    return lambda dx: function(model.retract(x, dx)), model.difference(x, x)
 
 
 def residual(model: Any, z: Array, z_hat: Array) -> Array:
@@ -102,7 +110,11 @@ def transition(dynamics: Dynamics, estimate: Gaussian, Q: Array) -> tuple[Array,
     elif hasattr(dynamics, "transition"):
         (f, F), W, name = dynamics.transition(x), Q, "dynamics.transition"
     else:
-        f, F, W = dynamics.f(x), first_derivative(dynamics.f, x, "dynamics.f"), Q
+        f, F, W = (
+            dynamics.f(x),
+            first_derivative(*by_error(dynamics, dynamics.f, x), "dynamics.f"),
+            Q,
+        )
         name = "dynamics.f"
     validation.core(f"f(x) of {name}", f, x.shape[-1:])
     validation.core(f"F of {name}", F, square)

@@ -1,6 +1,6 @@
 """How a filter predicts its state: the approximation of its moments, with f in the place of h."""
 
-from navfilters.estimators.model_parts import difference, moved, retract, transition
+from navfilters.estimators.model_parts import by_error, difference, moved, retract, transition
 from navfilters.estimators.sigma_points import SigmaPoints, offsets, root_of
 from navfilters.numerics.small_matrices import outer_sum
 from navfilters.numerics.state_derivatives import first_derivative
@@ -54,7 +54,8 @@ def predict_second_order(estimate: Gaussian, dynamics: Dynamics, Q: Array) -> Ga
     if hasattr(dynamics, "hessian"):
         second = dynamics.hessian(x)
     else:
-        second = first_derivative(lambda y: transition_jacobian(dynamics, y), x, "F of dynamics")
+        F = by_error(dynamics, lambda y: transition_jacobian(dynamics, y), x)
+        second = first_derivative(*F, "F of dynamics")
     xp = second.__array_namespace__()
     b = xp.sum(second * estimate.cov[..., None, :, :], axis=(-2, -1)) / 2
     squares = b[..., :, None] * b[..., None, :]

@@ -1,6 +1,8 @@
 """What a filter changes between its moments and the update."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -58,6 +60,42 @@ def bump_linear(prior: Gaussian, model: MeasurementModel, moments: Moments, *, b
     H = jacobian(model, prior.mean) if moments.H is None else moments.H
     spread = matmul(H, moments.P_xz)
     return prior, _add_noise(moments, _per_member(spread, bump) * spread)
+
+
+@dataclass(frozen=True, eq=False)
+class Underweighting:
+    """Lear's underweighting: :func:`bump_linear` in the first updates, nothing afterwards.
+
+    Parameters
+    ----------
+    bump : float or array (...)
+        The text's beta-bar, at least 0.
+    updates : int
+        How many.
+
+    References
+    ----------
+    pogorelsky2020, Eqs. (31)-(39), by the index rule. Eq. (39) prints beta for beta-bar.
+    """
+
+    bump: Array = 0.2
+    updates: int = 10
+
+    def __post_init__(self) -> None:
+        validation.whole_number("updates", self.updates, 0)
+        if not (validation.real_array("bump", self.bump, "") >= 0).all():
+            raise ValueError(f"bump must be at least 0; found {np.min(self.bump)}")
+
+    def at(self, k: Array) -> Variant:
+        """The variant of update k, from 0."""
+        if validation.traced(k):
+            xp = k.__array_namespace__()
+            return partial(bump_linear, bump=xp.where(k < self.updates, self.bump, 0.0))
+        return partial(bump_linear, bump=self.bump) if k < self.updates else unchanged
+
+    def __call__(self, prior: Gaussian, model: MeasurementModel, moments: Moments):
+        """The first update's, for a single one."""
+        return self.at(0)(prior, model, moments)
 
 
 def bump_predicted(

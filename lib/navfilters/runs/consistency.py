@@ -1,8 +1,9 @@
 """Whether a filter's errors are as large as it believes: tests over Monte Carlo runs.
 
-Errors are (runs, ..., n) with their covariances (runs, ..., n, n); the first axis is that of the
-independent runs, any others, such as time, are kept. Runs that are not finite are left out, and
-how many were used is part of the result. These functions are for the host: NumPy and scipy.stats.
+Errors are (..., n) with their covariances (..., n, n). Of their leading axes the caller names that
+of the independent runs, ``runs_axis``, and the others are kept: 1 for a history of ``run``, of
+shape (steps + 1, runs, n), 0 for one time of it. Innovations and S may take their place.
+Runs that are not finite are left out and counted. For the host: NumPy and scipy.stats.
 """
 
 from typing import Any, NamedTuple
@@ -86,7 +87,7 @@ def chi_square_band(dof: int, runs: Any = 1, confidence: float = 0.95) -> tuple[
     Raises
     ------
     ValueError
-        A confidence that is not between 0 and 1, or fewer than one run or degree of freedom.
+        A confidence not between 0 and 1, or fewer than one run or degree of freedom.
     """
     tail = _tail(confidence)
     one, many = validation.number("dof", dof), validation.real_array("runs", runs, "")
@@ -114,14 +115,14 @@ class MeanNees(NamedTuple):
     runs: np.ndarray
 
 
-def mean_nees(error: Any, cov: Any, confidence: float = 0.95) -> MeanNees:
-    """NEES, or NIS, averaged over the runs.
+def mean_nees(error: Any, cov: Any, *, runs_axis: int, confidence: float = 0.95) -> MeanNees:
+    """NEES averaged over the runs; NIS if given innovations and S.
 
     Parameters
     ----------
-    error : array (runs, ..., n)
-        Errors, or innovations.
-    cov : array (runs, ..., n, n)
+    error, cov : array (..., n), (..., n, n)
+    runs_axis : int
+        The axis of ``error`` that is averaged; negative ones count from the end.
     confidence : float
 
     Returns
@@ -131,14 +132,13 @@ def mean_nees(error: Any, cov: Any, confidence: float = 0.95) -> MeanNees:
     Raises
     ------
     ValueError
-        No finite run, a confidence that is not between 0 and 1, or arrays that do not fit.
+        No finite run, no such axis, a confidence not between 0 and 1, or arrays that do not fit.
 
     Notes
     -----
-    The average weighs every direction of the error by what the filter believes of it. It finds the
-    combinations of states that are wrong although each state by itself looks right.
+    It finds combinations of states that are wrong although each state by itself looks right.
     """
-    error, cov = _runs(error, cov)
+    error, cov = _runs_first(error, cov, runs_axis)
     each = nees(error, cov)
     runs = _counted(np.isfinite(each), 1)
     low, high = chi_square_band(error.shape[-1], runs, confidence)
@@ -170,15 +170,17 @@ class SampleDeviation(NamedTuple):
     runs: np.ndarray
 
 
-def sample_deviation(error: Any, cov: Any, confidence: float = 0.95) -> SampleDeviation:
+def sample_deviation(
+    error: Any, cov: Any, *, runs_axis: int, confidence: float = 0.95
+) -> SampleDeviation:
     """Sample against predicted deviation of each component.
 
     Parameters
     ----------
-    error : array (runs, ..., n)
-    cov : array (runs, ..., n, n)
-    confidence : float
-        Of each interval by itself: (k - 1) s^2 / sigma^2 is chi-square of k - 1 degrees of freedom.
+    error, cov : array (..., n), (..., n, n)
+    runs_axis, confidence : int, float
+        As for :func:`mean_nees`; of each interval by itself: (k - 1) s^2 / sigma^2 is chi-square of
+        k - 1 degrees of freedom.
 
     Returns
     -------
@@ -187,14 +189,10 @@ def sample_deviation(error: Any, cov: Any, confidence: float = 0.95) -> SampleDe
     Raises
     ------
     ValueError
-        Fewer than two finite runs, a confidence not between 0 and 1, or arrays that do not fit.
-
-    References
-    ----------
-    pogorelsky2020, section "Monte Carlo results", which compares the two without intervals.
+        As for :func:`mean_nees`; fewer than two finite runs.
     """
     tail = _tail(confidence)
-    error, cov = _runs(error, cov)
+    error, cov = _runs_first(error, cov, runs_axis)
     used = np.isfinite(error).all(-1) & np.isfinite(cov).all((-2, -1))
     runs = _counted(used, 2)
     k, keep = runs[..., None], used[..., None]
@@ -226,17 +224,18 @@ class Coverage(NamedTuple):
     runs: np.ndarray
 
 
-def coverage(error: Any, cov: Any, k: float = 3.0, confidence: float = 0.95) -> Coverage:
+def coverage(
+    error: Any, cov: Any, k: float = 3.0, *, runs_axis: int, confidence: float = 0.95
+) -> Coverage:
     """Fraction of runs in which each component is within k predicted deviations.
 
     Parameters
     ----------
-    error : array (runs, ..., n)
-    cov : array (runs, ..., n, n)
+    error, cov : array (..., n), (..., n, n)
     k : float
         How many deviations.
-    confidence : float
-        Of each interval by itself, at least, after Clopper and Pearson.
+    runs_axis, confidence : int, float
+        As for :func:`mean_nees`; of each interval by itself, at least, after Clopper and Pearson.
 
     Returns
     -------
@@ -245,14 +244,13 @@ def coverage(error: Any, cov: Any, k: float = 3.0, confidence: float = 0.95) -> 
     Raises
     ------
     ValueError
-        A k that is not positive, no finite run, a confidence not between 0 and 1, or arrays that do
-        not fit.
+        As for :func:`mean_nees`; a k that is not positive.
     """
     tail = _tail(confidence)
     k = validation.number("k", k)
     if k <= 0:
         raise ValueError(f"k must be a positive number of deviations; found {k}")
-    error, cov = _runs(error, cov)
+    error, cov = _runs_first(error, cov, runs_axis)
     used = np.isfinite(error).all(-1) & np.isfinite(cov).all((-2, -1))
     runs = _counted(used, 1)
     n = runs[..., None]
@@ -271,18 +269,26 @@ def _tail(confidence: float) -> float:
     return (1 - confidence) / 2
 
 
-def _runs(error: Any, cov: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Errors and covariances with the same leading axes, of which there is at least one."""
+def _runs_first(error: Any, cov: Any, runs_axis: int) -> tuple[np.ndarray, np.ndarray]:
+    """Errors and covariances with the same leading axes, that of the runs moved to the front."""
     error = validation.real_array("error", error, "", finite=False)
     cov = validation.real_array("cov", cov, "", finite=False)
     n = error.shape[-1] if error.ndim else 0
     if error.ndim < 2 or cov.shape[-2:] != (n, n):
         raise ValueError(
-            "error and cov must have shapes (runs, ..., n) and (runs, ..., n, n); "
+            "error and cov must have shapes (..., n) and (..., n, n), with an axis of runs; "
             f"found {error.shape} and {cov.shape}"
         )
+    whole = isinstance(runs_axis, int | np.integer) and not isinstance(runs_axis, bool)
+    axis = runs_axis - error.ndim if whole and runs_axis >= 0 else runs_axis  # arrays align there
+    if not whole or not -error.ndim <= axis < -1:
+        raise ValueError(
+            f"runs_axis must name an axis of error before its last, 0 to {error.ndim - 2}; "
+            f"found {runs_axis}, and error of shape {error.shape}"
+        )
     batch = validation.batch(error=error.shape[:-1], cov=cov.shape[:-2])
-    return np.broadcast_to(error, (*batch, n)), np.broadcast_to(cov, (*batch, n, n))
+    error, cov = np.broadcast_to(error, (*batch, n)), np.broadcast_to(cov, (*batch, n, n))
+    return np.moveaxis(error, axis, 0), np.moveaxis(cov, axis - 1, 0)
 
 
 def _counted(used: np.ndarray, needed: int) -> np.ndarray:

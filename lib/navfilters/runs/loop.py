@@ -10,17 +10,17 @@ from navfilters.numerics import validation
 from navfilters.numerics.allocator import keep_freed_memory
 from navfilters.numerics.small_matrices import is_positive_definite
 from navfilters.runs import model_checks, records
-from navfilters.types import Array, Dynamics, Gaussian, MeasurementModel
+from navfilters.types import Array, Gaussian
 
 
 def run(
     estimator: Any,
     prior: Gaussian,
     z: Any,
-    model: MeasurementModel,
+    model: Any,
     steps: int | None = None,
     *,
-    dynamics: Dynamics | None = None,
+    dynamics: Any = None,
     z_per_step: bool = False,
     record: Callable[[Any], Any] = records.estimate,
 ) -> Any:
@@ -38,7 +38,7 @@ def run(
         The measurement: the same at every step, or one for each; NaN where it was not measured. A
         function (k, predicted state) -> (..., m) measures when it is asked.
     model : MeasurementModel
-        Gives h, its derivatives and R.
+        Gives h and R, and its derivatives where it has them.
     steps : int, optional
         By default as many as z has with z_per_step, otherwise 1000.
     dynamics : Dynamics, optional

@@ -107,8 +107,9 @@ def measurements(
         raise ValueError(f"model must have R, and h with its derivatives; found {found}")
     R = validation.covariance("model.R", model.R, definite=False)
     shapes["model.R"] = R.shape[:-2]
-    if not hasattr(model, "given"):
-        _fits(z, prior, at(model, 0), axes, name)
+    first = at(model, 0)
+    if not hasattr(first, "given"):
+        _fits(z, prior, first, axes, name)
     return z, validation.batch(**shapes)
 
 
@@ -140,8 +141,9 @@ def models(model: Any, motion: Any, prior: Gaussian, name: str = "prior") -> Non
     ValueError
         As of :func:`sensor` and :func:`dynamics`.
     """
-    if not hasattr(model, "given"):
-        sensor(at(model, 0), prior, name=name)
+    first = at(model, 0)
+    if not hasattr(first, "given"):
+        sensor(first, prior, name=name)
     if motion is not None:
         dynamics(at(motion, 0), prior)
 

@@ -9,6 +9,7 @@ import numpy as np
 from navfilters.numerics import validation
 from navfilters.numerics.loops import is_jax, repeat
 from navfilters.space.earth_fixed_orbit import TURN, EarthFixedOrbit
+from navfilters.space.pose import difference, retract
 from navfilters.space.variations import forwards, rates, series
 from navfilters.types import Array
 
@@ -112,6 +113,9 @@ class EarthFixedNavigation:
         W[..., :6, 6:] = sum(of_noise) @ Q[..., :6, 6:]
         W[..., 6:, :6] = W[..., :6, 6:].mT
         return self._with_attitude(flown, x), F, W
+
+    retract = staticmethod(retract)
+    difference = staticmethod(difference)
 
     def _with_attitude(self, flown: Array, x: Array) -> Array:
         return x.__array_namespace__().concat([flown, x[..., 6:]], axis=-1)

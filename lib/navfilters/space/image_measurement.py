@@ -1,31 +1,18 @@
 """What a focused and geolocated SAR image says of the spacecraft that took it."""
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from navfilters.numerics import validation
 from navfilters.numerics.analytic import dot
 from navfilters.space.frames import antenna_axes
+from navfilters.space.image_sensor import Pixel
+from navfilters.space.navigation_state import NavigationState
+from navfilters.space.pose import difference, retract
 from navfilters.space.quaternions import cross_matrix, matrix
 from navfilters.types import Array
-
-
-class NavigationState(Protocol):
-    """What a measurement depends on: see ``navfilters.estimators.multiplicative.MekfState``."""
-
-    @property
-    def r(self) -> Array:
-        """Position, Earth-fixed, (..., 3), m."""
-
-    @property
-    def v(self) -> Array:
-        """Velocity, Earth-fixed, (..., 3), m/s."""
-
-    @property
-    def q_mu(self) -> Array:
-        """Misalignment of the antenna, a unit quaternion (..., 4)."""
 
 
 class Measurement(NamedTuple):
@@ -52,6 +39,17 @@ class Measurement(NamedTuple):
     r_f: Array
     slant_range: Array
     speed: Array
+
+    @classmethod
+    def of(cls, z: Array) -> "Measurement":
+        """The parts of a measurement z (..., 5)."""
+        return cls(z[..., :3], z[..., 3], z[..., 4])
+
+    @property
+    def z(self) -> Array:
+        """All of it, (..., 5)."""
+        xp = self.r_f.__array_namespace__()
+        return xp.concat([self.r_f, self.slant_range[..., None], self.speed[..., None]], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +80,7 @@ class SarGeometry:
     Notes
     -----
     The boresight meets the pixel by definition of the antenna frame, so the ratios are *measured*
-    as zero, without noise: their error is the pixel's, which ``linearize`` adds to R as B.
+    as zero, without noise: their error is the pixel's, which ``noise`` adds to R as B.
 
     Slips in the text: (15) lacks T_e^b, which (22) has; (27) applies T_mu T_b^s T_e^b to a vector
     that is in the antenna frame already; (28) calls the misalignment delta theta.
@@ -210,38 +208,50 @@ class SarGeometry:
         r_sf, _, T = self._together(state, r_f)
         return _derivatives(r_sf, T)[0]
 
-    def linearize(self, state: NavigationState, measurement: Measurement) -> tuple:
-        """The residual, H, and the covariance of what the measurement adds to it.
-
-        y - h,   H,   R + B with B = H_f D H_f^T
+    def noise(self, state: NavigationState, r_f: Array) -> Array:
+        """R + B with B = H_f D H_f^T: what the measurement adds to the innovation's covariance.
 
         Parameters
         ----------
         state : NavigationState
-        measurement : Measurement
+        r_f : array (..., 3)
+            Earth-fixed position of the pixel, m.
 
         Returns
         -------
-        tuple of array (..., 4), array (..., 4, 9), array (..., 4, 4)
-            NaN where the measurement is.
+        array (..., 4, 4)
 
         References
         ----------
         pogorelsky2020, Eqs. (29), (33).
         """
-        measurement = Measurement(
-            *(
-                validation.given(f"measurement.{name}", part)
-                for name, part in measurement._asdict().items()
-            )
-        )
-        r_f = validation.core("measurement.r_f", measurement.r_f, (3,))
         xp = r_f.__array_namespace__()
+        H_f = self.pixel_jacobian(state, r_f)
+        return xp.asarray(self.R) + H_f @ xp.asarray(self.D) @ H_f.mT
+
+    def given(self, z: Array) -> tuple[Array, Pixel]:
+        """What is compared with h, and the sensor that it makes: for a filter.
+
+        Parameters
+        ----------
+        z : array (..., 5)
+            ``Measurement.z``: pixel, slant range, speed. NaN in any of it is an image that could
+            not be matched.
+
+        Returns
+        -------
+        tuple of array (..., 4), Pixel
+            The ratios are measured as zero.
+        """
+        measurement = Measurement.of(validation.core("z", validation.given("z", z), (5,)))
+        xp = measurement.r_f.__array_namespace__()
+        lost = xp.any(xp.isnan(z), axis=-1)[..., None]
         seen = xp.stack([measurement.slant_range, measurement.speed], axis=-1)
         y = xp.concat([xp.zeros_like(seen), seen], axis=-1)
-        H_f = self.pixel_jacobian(state, r_f)
-        B = H_f @ xp.asarray(self.D) @ H_f.mT
-        return y - self.h(state, r_f), self.jacobian(state, r_f), xp.asarray(self.R) + B
+        return xp.where(lost, xp.nan, y), Pixel(self, measurement.r_f)
+
+    retract = staticmethod(retract)
+    difference = staticmethod(difference)
 
     def _to_antenna(self, q_mu: Array) -> Array:
         """T_mu T_b^s T_e^b."""

@@ -12,6 +12,7 @@ from navfilters.book.plotting.curves import (
     sweep_panels,
 )
 from navfilters.book.plotting.drawings import block_diagram, coastlines, map_panels
+from navfilters.book.plotting.spreads import nine_errors
 from navfilters.book.plotting.styles import (
     BOUND,
     EKF,
@@ -43,6 +44,7 @@ __all__ = [
     "label_ends",
     "map_panels",
     "mark_failures",
+    "nine_errors",
     "panels",
     "sweep_panels",
     "use_style",

@@ -26,6 +26,7 @@ from navfilters.papers.pogorelsky2020.experiment import (
     Setup,
     of_case,
 )
+from navfilters.papers.pogorelsky2020.final_nees import final_nees, nees_line
 from navfilters.papers.pogorelsky2020.image_tables import (
     ImageTable,
     assumed_speeds,
@@ -39,12 +40,14 @@ from navfilters.papers.pogorelsky2020.imaging import (
     Imaging,
     same_images,
 )
+from navfilters.papers.pogorelsky2020.linearised import FixedModel, Leg, linearised_flight
 from navfilters.papers.pogorelsky2020.noise_draws import Noise, misalignment, noise
 from navfilters.papers.pogorelsky2020.open_loop import (
     MonteCarlo,
     SimulatedImages,
     monte_carlo,
     open_table,
+    simulate_images,
 )
 from navfilters.papers.pogorelsky2020.real_flight import (
     MISSING,
@@ -80,11 +83,13 @@ __all__ = [
     "Agreement",
     "Attempt",
     "Campaign",
+    "FixedModel",
     "Folder",
     "Formed",
     "ImageTable",
     "Images",
     "Imaging",
+    "Leg",
     "MonteCarlo",
     "Noise",
     "Outcome",
@@ -99,16 +104,19 @@ __all__ = [
     "campaign_report",
     "closed_table",
     "cut_patches",
+    "final_nees",
     "first_lines",
     "fitted",
     "flight_through",
     "image_table",
     "initial_state",
+    "linearised_flight",
     "lines_between",
     "measure_directly",
     "misalignment",
     "monte_carlo",
     "monte_carlo_closed",
+    "nees_line",
     "noise",
     "of_case",
     "open_table",
@@ -117,6 +125,7 @@ __all__ = [
     "run_campaign",
     "run_filter",
     "same_images",
+    "simulate_images",
     "summary",
     "tabulate",
     "true_flight",

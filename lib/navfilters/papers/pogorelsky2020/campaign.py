@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from navfilters.estimators.multiplicative import MekfState
 from navfilters.numerics import validation
 from navfilters.papers.pogorelsky2020.acquisition import acquire, measure_directly
 from navfilters.papers.pogorelsky2020.campaign_store import Folder, Formed
@@ -20,6 +19,7 @@ from navfilters.papers.pogorelsky2020.open_loop import MonteCarlo, monte_carlo
 from navfilters.runs import stored_arrays
 from navfilters.runs.progress import bar
 from navfilters.space.image_measurement import Measurement
+from navfilters.space.navigation_state import NavigationState
 
 ACQUIRING, CLIMBING = 40, 14
 """What the raw data of an image and a climb with its match cost, in images: for the time left."""
@@ -174,7 +174,7 @@ class _Directly:
     images: Images
     done: Callable[[int], Any]
 
-    def __call__(self, k: int, state: MekfState) -> Measurement:
+    def __call__(self, k: int, state: NavigationState) -> Measurement:
         acquired: Acquisition | None = None
         found = []
         for run, start in enumerate(np.linalg.norm(state.v, axis=-1)):
@@ -195,14 +195,14 @@ class _Directly:
 
 
 def _compare(own: list, alone: MonteCarlo, log: list, closed: MonteCarlo) -> Agreement:
-    n = len(alone.errors)
+    n = alone.errors.shape[1]
     absent, speed, pixel = [], [], []
     for direct, tabulated in zip(own, log, strict=True):
         absent.append(direct.absent != tabulated.absent[:n])
         speed.append(np.abs(direct.speed - tabulated.speed[:n]))
         pixel.append(np.linalg.norm(direct.r_f - tabulated.r_f[:n], axis=-1))
-    apart = alone.errors[:, UPDATES] - closed.errors[:n, UPDATES]
-    sigma = np.sqrt(np.diagonal(closed.covariances[:n, UPDATES], axis1=-2, axis2=-1))
+    apart = alone.errors[UPDATES] - closed.errors[UPDATES, :n]
+    sigma = np.sqrt(np.diagonal(closed.covariances[UPDATES, :n], axis1=-2, axis2=-1))
     both = [np.nan_to_num(np.concatenate(parts)) for parts in (speed, pixel)]
     return Agreement(
         n * UPDATES,
@@ -236,7 +236,7 @@ def campaign_report(found: Campaign) -> str:
             f"{loss[1]:.0f} % less; centre within {off:.1f} m, by {image.inliers.min()} inliers"
         )
     for case, closed in found.closed.items():
-        lines.append(f"{case}, {len(closed.errors)} runs, 1-sigma position at 25 s")
+        lines.append(f"{case}, {closed.errors.shape[1]} runs, 1-sigma position at 25 s")
         lines.append(summary(closed, found.opened[case]))
     if found.agreement is not None:
         images, otherwise, speed, pixel, deviations = found.agreement

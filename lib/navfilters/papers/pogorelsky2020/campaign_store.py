@@ -9,6 +9,9 @@ from navfilters.papers.pogorelsky2020.imaging import Imaging
 from navfilters.runs import stored_arrays
 from navfilters.types import Array
 
+FORMAT = 2
+"""Of the stored arrays; 1 had the runs on the first axis and the times on the second."""
+
 
 @dataclass(frozen=True, eq=False)
 class Folder:
@@ -71,7 +74,7 @@ class Folder:
         stored_arrays.save(self.path / f"{name}.npz", self._job(job), **arrays)
 
     def _job(self, job: tuple) -> str:
-        return repr((navfilters.__version__, self.imaging, *job))
+        return repr((FORMAT, navfilters.__version__, self.imaging, *job))
 
 
 class Formed(NamedTuple):

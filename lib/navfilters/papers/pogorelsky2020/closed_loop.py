@@ -6,7 +6,6 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from navfilters.estimators.multiplicative import MekfState
 from navfilters.papers.pogorelsky2020.experiment import Setup, of_case
 from navfilters.papers.pogorelsky2020.image_tables import ImageTable, tabulate
 from navfilters.papers.pogorelsky2020.imaging import FULL, Imaging, same_images
@@ -16,6 +15,7 @@ from navfilters.papers.pogorelsky2020.true_flight import truth
 from navfilters.runs.consistency import mean_nees, sample_deviation
 from navfilters.sar.images.slant_image import effective_velocity
 from navfilters.space.image_measurement import Measurement
+from navfilters.space.navigation_state import NavigationState
 from navfilters.types import Array
 
 UPDATES = 3
@@ -63,14 +63,14 @@ class Images:
         if self.geometry not in ("nominal", "predicted"):
             raise ValueError(f"geometry must be 'nominal' or 'predicted'; found {self.geometry!r}")
 
-    def __call__(self, k: int, state: MekfState) -> Measurement:
+    def __call__(self, k: int, state: NavigationState) -> Measurement:
         """The image after interval k, as each run focuses it.
 
         Parameters
         ----------
         k : int
             From 1.
-        state : MekfState
+        state : NavigationState
             What the filter predicts; one for each run.
 
         Returns
@@ -123,7 +123,7 @@ class Images:
             r_f, np.where(absent, np.nan, slant_range), np.where(absent, np.nan, speed)
         )
 
-    def _offset(self, k: int, table: ImageTable, state: MekfState) -> Array:
+    def _offset(self, k: int, table: ImageTable, state: NavigationState) -> Array:
         """What a run's own geometry adds to the velocity that it assumes, m/s."""
         if self.geometry == "nominal":
             return np.zeros(len(state.v))
@@ -244,13 +244,13 @@ def summary(closed: MonteCarlo, opened: MonteCarlo) -> str:
     """
     lines = [f"{'':12}{'closed loop':>24}{'open loop':>24}"]
     lines.append(f"{'':12}{'predicted':>12}{'sample':>12}{'predicted':>12}{'sample':>12}")
-    at = UPDATES
-    spreads = [sample_deviation(m.errors[:, at], m.covariances[:, at]) for m in (closed, opened)]
+    after = [(m.errors[UPDATES], m.covariances[UPDATES]) for m in (closed, opened)]
+    spreads = [sample_deviation(*pair, runs_axis=0) for pair in after]
     for i, axis in enumerate("xyz"):
         cells = "".join(f"{s.predicted[i]:12.1f}{s.sample[i]:12.1f}" for s in spreads)
         lines.append(f"{axis} (m)      {cells}")
-    totals = [mean_nees(m.errors[:, at], m.covariances[:, at]) for m in (closed, opened)]
+    totals = [mean_nees(*pair, runs_axis=0) for pair in after]
     lines.append(f"{'NEES':12}" + "".join(f"{'':12}{t.mean:12.1f}" for t in totals))
     failed = int(np.isnan(closed.innovations).any(axis=-1).sum())
-    lines.append(f"{failed} of {closed.innovations.shape[0] * UPDATES} images failed")
+    lines.append(f"{failed} of {closed.innovations.shape[1] * UPDATES} images failed")
     return "\n".join(lines)

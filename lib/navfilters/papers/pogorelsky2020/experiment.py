@@ -5,7 +5,11 @@ from typing import Any, Literal
 
 import numpy as np
 
+from navfilters.estimators.filter import Filter
+from navfilters.estimators.moments import linearized
+from navfilters.estimators.variants import Underweighting
 from navfilters.numerics import validation
+from navfilters.space.earth_fixed_navigation import EarthFixedNavigation
 from navfilters.space.earth_fixed_orbit import EARTH_RATE, EarthFixedOrbit
 from navfilters.space.frames import enu_covariance
 from navfilters.space.gravity import EARTH, Gravity
@@ -52,8 +56,6 @@ class Setup:
         Lear's beta-bar.
     underweighted : int
         The first so many updates are underweighted.
-    gamma : float, optional
-        Trace rule of Eq. (31) on top of the index rule, m: see ``mekf_update``.
     walk : bool
         Whether the true misalignment takes the random walk that ``psd_mu`` describes.
     interval : float
@@ -89,7 +91,6 @@ class Setup:
     pixel: tuple[float, float, float] = (2.0, 8.0, 1.0)
     underweighting: float = 0.2
     underweighted: int = 10
-    gamma: float | None = None
     walk: bool = True
     interval: float = 600 / 72
     steps: int = 10
@@ -114,8 +115,6 @@ class Setup:
             if value.shape != needed or (value < 0).any():
                 each = "three numbers" if needed else "a number"
                 raise ValueError(f"{name} must be {each} of at least 0; found {found}")
-        if self.gamma is not None and not self.gamma >= 0:
-            raise ValueError(f"gamma must be None or at least 0 m; found {self.gamma}")
 
     @property
     def orbit(self) -> EarthFixedOrbit:
@@ -130,6 +129,16 @@ class Setup:
         R = np.diag([0.0, 0.0, self.sigma_range**2, self.sigma_speed**2])
         D = enu_covariance(self.pixel, *self.target)
         return SarGeometry(np.deg2rad(self.look), np.deg2rad(self.squint), R, D)
+
+    @property
+    def mekf(self) -> Filter:
+        """The multiplicative EKF: the EKF on a state with an attitude, underweighted at first."""
+        return Filter(linearized, Underweighting(self.underweighting, self.underweighted))
+
+    @property
+    def dynamics(self) -> EarthFixedNavigation:
+        """What the filter knows of the motion from one image to the next."""
+        return EarthFixedNavigation(self.orbit, self.steps)
 
     @property
     def P0(self) -> Array:

@@ -193,7 +193,6 @@ OF_THE_FILTER = (
     "pixel",
     "underweighting",
     "underweighted",
-    "gamma",
     "walk",
     "integrator",
 )

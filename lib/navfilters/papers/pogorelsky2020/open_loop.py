@@ -2,19 +2,23 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from navfilters.estimators.multiplicative import MekfState, MekfUpdate, mekf_update
+from navfilters.estimators.state import FilterState
 from navfilters.numerics import validation
 from navfilters.papers.pogorelsky2020.experiment import PAPER, Setup, of_case
 from navfilters.papers.pogorelsky2020.noise_draws import Noise, misalignment, noise
 from navfilters.papers.pogorelsky2020.true_flight import Truth, truth
 from navfilters.runs.consistency import mean_nees, sample_deviation
+from navfilters.runs.loop import run
 from navfilters.space.frames import east_north_up, ellipsoid_intersection
 from navfilters.space.image_measurement import Measurement
-from navfilters.space.quaternions import conjugate, from_rotation_vector, product, rotation_vector
-from navfilters.types import Array
+from navfilters.space.image_sensor import SarPass
+from navfilters.space.navigation_state import NavigationState
+from navfilters.space.pose import difference, retract
+from navfilters.types import Array, Gaussian
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +43,14 @@ class SimulatedImages:
     q_mu: Array
     noise: Noise
 
-    def __call__(self, k: int, state: MekfState) -> Measurement:
+    def __call__(self, k: int, state: NavigationState) -> Measurement:
         """The image after interval k; it does not depend on the state, a focused one would.
 
         Parameters
         ----------
         k : int
             From 1.
-        state : MekfState
+        state : NavigationState
             What the filter predicts.
 
         Returns
@@ -67,6 +71,45 @@ class SimulatedImages:
             np.linalg.norm(x[3:]) + setup.sigma_speed * self.noise.speed[:, k - 1],
         )
 
+    def true_state(self, k: int) -> NavigationState:
+        """The state that the image after interval k is made at.
+
+        Parameters
+        ----------
+        k : int
+            From 1.
+
+        Returns
+        -------
+        NavigationState
+        """
+        x = self.flight.x[k]
+        return NavigationState(x[:3], x[3:], self.q_mu[:, k])
+
+
+def simulate_images(
+    case: str | Setup = "TC-1",
+    runs: int | Sequence[int] = 100,
+    seed: int = 0,
+    *,
+    flight: Truth | None = None,
+) -> SimulatedImages:
+    """The images that ``monte_carlo`` measures by default: the same draws for the same arguments.
+
+    Parameters
+    ----------
+    case, runs, seed, flight
+        As for :func:`monte_carlo`; a flight of 72 intervals by default.
+
+    Returns
+    -------
+    SimulatedImages
+    """
+    setup = of_case(case)
+    flight = truth(setup) if flight is None else flight
+    drawn = noise(runs, len(flight.times) - 1, seed)
+    return SimulatedImages(setup, flight, misalignment(setup, drawn.walk), drawn)
+
 
 @dataclass(frozen=True, eq=False)
 class MonteCarlo:
@@ -76,13 +119,13 @@ class MonteCarlo:
     ----------
     times : array (t,)
         0, after each update, and the end of a coast, s.
-    errors : array (runs, t, 9)
+    errors : array (t, runs, 9)
         Truth minus estimate: position, m, velocity, m/s, misalignment as a rotation vector, rad.
-    covariances : array (runs, t, 9, 9)
+    covariances : array (t, runs, 9, 9)
         What the filter believed of them.
-    innovations : array (runs, updates, 4)
+    innovations : array (updates, runs, 4)
         Measured minus expected; NaN where there was no measurement.
-    S : array (runs, updates, 4, 4)
+    S : array (updates, runs, 4, 4)
         What the filter believed of them, underweighting included.
     """
 
@@ -100,8 +143,8 @@ def monte_carlo(
     seed: int = 0,
     *,
     flight: Truth | None = None,
-    measure: Callable[[int, MekfState], Measurement] | None = None,
-    update: Callable[..., MekfUpdate] = mekf_update,
+    measure: Callable[[int, NavigationState], Measurement] | None = None,
+    estimator: Any = None,
     progress: Callable[[Iterable], Iterable] = iter,
 ) -> MonteCarlo:
     """All runs of a test case in one batch.
@@ -125,8 +168,8 @@ def monte_carlo(
     measure : callable, optional
         (k, predicted state) -> Measurement of update k, from 1; by default ``SimulatedImages``. A
         NaN in it is an image that was not matched.
-    update : callable
-        Called as ``mekf_update`` is.
+    estimator : Filter, optional
+        With ``init``, ``predict`` and ``update``; the set-up's ``mekf`` by default.
     progress : callable
         Wraps the iterable of intervals.
 
@@ -151,51 +194,43 @@ def monte_carlo(
     intervals = len(flight.times) - 1
     if intervals < updates:
         raise ValueError(f"flight must last {updates} intervals, one an update; found {intervals}")
-    drawn = noise(runs, intervals, seed)
-    q_true = misalignment(setup, drawn.walk)
-    measure = SimulatedImages(setup, flight, q_true, drawn) if measure is None else measure
-    state = _first_estimate(setup, flight.x[0], q_true[:, 0], drawn.first)
-    orbit, geometry, after = setup.orbit, setup.geometry, [(0, state)]
-    made: list[MekfUpdate] = []
-    for k in progress(range(1, intervals + 1)):
-        x = np.concatenate([state.r, state.v], axis=-1)
-        x, P = orbit.propagate(x, state.P, setup.steps)
-        state = MekfState(x[..., :3], x[..., 3:], state.q_mu, P)
-        if k <= updates:
-            made.append(
-                update(
-                    state,
-                    measure(k, state),
-                    replace(geometry, T_e_b=flight.T_e_b[k]),
-                    underweighting=setup.underweighting if k <= setup.underweighted else 0.0,
-                    gamma=setup.gamma,
-                )
-            )
-            state = made[-1].state
-        if k <= updates or k == intervals:
-            after.append((k, state))
-    errors = [_error(flight.x[k], q_true[:, k], state) for k, state in after]
+    images = simulate_images(setup, runs, seed, flight=flight)
+    measure = images if measure is None else measure
+    ticks = iter(progress(range(1, intervals + 1)))
+    nothing = np.full((len(images.noise.first), 5), np.nan)
+
+    def image(k: int, state: FilterState) -> Array:
+        next(ticks)
+        if k >= updates:
+            return nothing  # the filter coasts
+        return measure(k + 1, NavigationState.of(state.estimate.mean)).z
+
+    estimates, innovations, S = run(
+        setup.mekf if estimator is None else estimator,
+        _first_estimate(setup, images.true_state(0), images.noise.first),
+        image,
+        SarPass(setup.geometry, flight.T_e_b[1:]),
+        intervals,
+        dynamics=setup.dynamics,
+        record=lambda state: (state.estimate, state.innovation, state.S),
+    )
+    next(ticks, None)  # a bar that counts is done
+    kept = sorted({*range(updates + 1), intervals})
+    truths = np.stack([images.true_state(k).x for k in kept])
+    made = slice(1, updates + 1)
     return MonteCarlo(
-        flight.times[[k for k, _ in after]],
-        np.stack(errors, axis=1),
-        np.stack([state.P for _, state in after], axis=1),
-        np.stack([each.innovation for each in made], axis=1),
-        np.stack([each.S for each in made], axis=1),
+        flight.times[kept],
+        difference(truths, estimates.mean[kept]),
+        estimates.cov[kept],
+        innovations[made],
+        S[made],
     )
 
 
-def _first_estimate(setup: Setup, x: Array, q_mu: Array, drawn: Array) -> MekfState:
+def _first_estimate(setup: Setup, true: NavigationState, drawn: Array) -> Gaussian:
     """The truth without a drawn error, so that truth minus estimate is that error exactly."""
     error = np.sqrt(np.diag(setup.P0)) * drawn
-    q = product(from_rotation_vector(-error[:, 6:]), q_mu)
-    P = np.broadcast_to(setup.P0, (len(drawn), 9, 9))
-    return MekfState(x[:3] - error[:, :3], x[3:] - error[:, 3:6], q, P)
-
-
-def _error(x: Array, q_mu: Array, state: MekfState) -> Array:
-    """Truth minus estimate, (runs, 9)."""
-    turned = rotation_vector(product(q_mu, conjugate(state.q_mu)))
-    return np.concatenate([x[:3] - state.r, x[3:] - state.v, turned], axis=-1)
+    return Gaussian(retract(true.x, -error), np.broadcast_to(setup.P0, (len(drawn), 9, 9)))
 
 
 def open_table(
@@ -218,8 +253,8 @@ def open_table(
     """
     result = monte_carlo(case, runs=runs, seed=seed, progress=progress)
     first = of_case(case).sigma_r
-    spread = sample_deviation(result.errors[:, -1], result.covariances[:, -1])
-    total = mean_nees(result.errors[:, -1], result.covariances[:, -1])
+    at_end = result.errors[-1], result.covariances[-1]
+    spread, total = sample_deviation(*at_end, runs_axis=0), mean_nees(*at_end, runs_axis=0)
     lines = [f"{'':6}{'predicted':>11}{'sample (95 %)':>25}{'fell by':>10}{'paper':>18}"]
     for i, axis in enumerate("xyz"):
         low, sample, high = (f"{s[i]:.1f}" for s in (spread.low, spread.sample, spread.high))

@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from navfilters.estimators.multiplicative import MekfState
 from navfilters.papers.pogorelsky2020.acquisition import measure_directly
 from navfilters.papers.pogorelsky2020.imaging import FULL, Imaging
 from navfilters.papers.pogorelsky2020.real_patches import Patch
 from navfilters.sar.images.autofocusing import Climb
 from navfilters.sar.matching.geolocation import Match
 from navfilters.space.image_measurement import Measurement
+from navfilters.space.navigation_state import NavigationState
 from navfilters.types import Array
 
 
@@ -56,14 +56,14 @@ class RealImages:
     imaging: Imaging = FULL
     log: list[RealAttempt] = field(default_factory=list, init=False, repr=False)
 
-    def __call__(self, k: int, state: MekfState) -> Measurement:
+    def __call__(self, k: int, state: NavigationState) -> Measurement:
         """The image after interval k, as each run forms it.
 
         Parameters
         ----------
         k : int
             From 1.
-        state : MekfState
+        state : NavigationState
             What the filter predicts; one for each run.
 
         Returns

@@ -146,7 +146,7 @@ def real_table(product: Product, patches: Sequence[Patch], outcome: Outcome) -> 
     errors, sigma = outcome.result.errors[..., :3], outcome.result.covariances
     deviation = np.sqrt(np.diagonal(sigma[..., :3, :3], axis1=-2, axis2=-1))
     before, after = (
-        np.sqrt(np.mean(np.square([errors[:, i], deviation[:, i]]), axis=1)) for i in (0, -1)
+        np.sqrt(np.mean(np.square([errors[i], deviation[i]]), axis=1)) for i in (0, -1)
     )
     lines.append(f"\n{'':6}{'before':>12}{'1-sigma':>10}{'after':>12}{'1-sigma':>10}")
     for i, axis in enumerate("xyz"):

@@ -1,0 +1,40 @@
+"""The NEES at the end of the runs of Pogorelsky et al., as numbers and in words."""
+
+import numpy as np
+from scipy import stats
+
+from navfilters.papers.pogorelsky2020.open_loop import MonteCarlo
+from navfilters.runs.consistency import nees
+from navfilters.types import Array
+
+
+def final_nees(result: MonteCarlo) -> Array:
+    """NEES of each run at the last time.
+
+    Parameters
+    ----------
+    result : MonteCarlo
+
+    Returns
+    -------
+    array (runs,)
+    """
+    return nees(result.errors[-1], result.covariances[-1])
+
+
+def nees_line(values: Array, dof: int = 9) -> str:
+    """Mean with half its 95 % interval, median, and the share above the bound of one in a hundred.
+
+    Parameters
+    ----------
+    values : array (runs,)
+    dof : int
+        Degrees of freedom of a consistent filter.
+
+    Returns
+    -------
+    str
+    """
+    half = 1.96 * values.std() / np.sqrt(len(values))
+    above = 100 * np.mean(values > stats.chi2.ppf(0.99, dof))
+    return f"{values.mean():5.1f} ± {half:.1f}, median {np.median(values):4.1f}, {above:4.1f} %"
