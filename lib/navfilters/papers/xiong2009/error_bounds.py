@@ -99,11 +99,9 @@ def assumptions(F: Array, beta: Array, H: Array, P: Array, R: Array, Q: Array) -
     -------
     Assumptions
 
-    Notes
-    -----
-    (17) prints h_min^2 I <= H H^T; (A.14) uses it as h_min^2 I <= H^T H. The two agree when H is
-    square. With fewer measurements than states the second has h_min = 0, and (A.14) says nothing;
-    V then contracts by what Q adds: see ``contraction``.
+    References
+    ----------
+    xiong2009, Eqs. (17), (18).
     """
     m, n = H.shape[-2:]
     f, b, h = (np.linalg.svd(A, compute_uv=False) for A in (F, beta, H))
@@ -165,14 +163,6 @@ def theorem_constants(a: Assumptions) -> tuple[float, float]:
     -------
     tuple of float
         (lambda_min, mu_max).
-
-    Notes
-    -----
-    The proof reaches lambda_min through the lambda_t of (A.11), which may be smaller. The rate
-    holds all the same. With the Sigma of the step, (I - K H)^T P^-1 (I - K H) =
-    (Sigma + Sigma H^T R^-1 H Sigma)^-1 <= Sigma^-1 / (1 + s), where
-    s = h_min^2 p_min (beta_min f_min)^2 / r_max because Sigma > beta F P F^T beta, Eq. (19). So V
-    contracts by s / (1 + s), which is never below lambda_min.
 
     References
     ----------
