@@ -147,8 +147,11 @@ def together(variants: str = "ABCD") -> Setup:
         A letter that is none.
     """
     readings = [_variant(name) for name in variants]
-    noises = ("earth_noise", "star_noise", "q_v")
-    return Setup(**{name: np.array([[getattr(r, name)] for r in readings]) for name in noises})
+    return Setup(
+        earth_noise=np.array([[setup.earth_noise] for setup in readings]),
+        star_noise=np.array([[setup.star_noise] for setup in readings]),
+        q_v=np.array([[setup.q_v] for setup in readings]),
+    )
 
 
 class Estimator(NamedTuple):
