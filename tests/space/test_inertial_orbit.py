@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
-from navfilters.space import inertial_orbit
+from navfilters.space import variations
 from navfilters.space.gravity import EARTH, Gravity
 from navfilters.space.inertial_orbit import Orbit
 from navfilters.space.osculating_ellipse import perigee_apogee
@@ -226,7 +226,7 @@ def test_batch_axes_come_first_and_members_do_not_meet(batch):
 @pytest.mark.parametrize("cached", [1, 13, 10**6])
 def test_the_size_of_the_cache_changes_nothing(monkeypatch, cached):
     wanted = Orbit(thrust=BURN).interval(states())
-    monkeypatch.setattr(inertial_orbit, "CACHED", cached)
+    monkeypatch.setattr(variations, "CACHED", cached)
     assert_array_equal(Orbit(thrust=BURN).interval(states()).F, wanted.F)
 
 

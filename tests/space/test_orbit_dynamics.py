@@ -57,19 +57,27 @@ def test_one_integration_gives_what_the_interval_gives(orbit, batch):
 
 
 @each_motion
-@pytest.mark.parametrize("batch", [(), (3,), (2, 3)])
-@pytest.mark.parametrize("k", [0, 1])
-def test_jax_steps_forwards_to_the_same(orbit, batch, k):
+def test_jax_steps_forwards_to_the_same(orbit):
     """In one loop from the first sub-step on, with a traced step, for a burn as for a coast."""
-    x = states(*batch)
-    wanted = orbit.at(k).propagate(x, Q)
-    got = jax.jit(lambda k, x: orbit.at(k).propagate(x, jnp.asarray(Q)))(k, x)
-    for ours, theirs in zip(got, wanted, strict=True):
-        assert_close(ours, theirs, 1e-13)
-    pair = jax.jit(lambda k, x: orbit.at(k).transition(x))(k, x)
-    for ours, theirs in zip(pair, wanted[:2], strict=True):
-        assert_close(ours, theirs, 1e-13)
-    assert_close(jax.jit(lambda k, x: orbit.at(k).f(x))(k, x), wanted[0], 1e-15)
+
+    @jax.jit
+    def all_of(k, x):
+        now = orbit.at(k)
+        return *now.propagate(x, jnp.asarray(Q)), *now.transition(x), now.f(x)
+
+    x, k = states(2, 3), 1
+    now = orbit.at(k)
+    wanted = (*now.propagate(x, Q), *now.transition(x), now.f(x))
+    for got, ours in zip(all_of(k, x), wanted, strict=True):
+        assert_close(got, ours, 1e-13)
+
+
+@pytest.mark.parametrize("batch", [(), (0,)])
+def test_jax_takes_any_batch_of_states(batch):
+    x, orbit = states(*batch), Orbit(thrust=BURN, substeps=50)
+    for got, ours in zip(jax.jit(orbit.transition)(x), orbit.transition(x), strict=True):
+        assert got.shape == ours.shape
+        assert_allclose(got, ours, rtol=0, atol=1e-12 * np.abs(ours).max(initial=0))
 
 
 def test_jax_takes_a_batch_of_noise():
@@ -83,11 +91,8 @@ def test_jax_takes_a_batch_of_noise():
 
 
 def test_what_jax_compiles_does_not_grow_with_the_sub_steps():
-    sizes = [
-        len(str(jax.make_jaxpr(Orbit(thrust=BURN, substeps=n).transition)(states())))
-        for n in (10, 100)
-    ]
-    assert sizes[1] < sizes[0] + 10
+    long = Orbit(thrust=BURN, substeps=1000)
+    assert len(jax.make_jaxpr(long.transition)(states()).eqns) < 100
 
 
 def test_a_later_interval_burns_at_its_own_time():

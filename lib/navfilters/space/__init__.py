@@ -15,7 +15,7 @@ from navfilters.space.frames import (
 )
 from navfilters.space.gravity import EARTH, Gravity
 from navfilters.space.image_measurement import Measurement, NavigationState, SarGeometry
-from navfilters.space.inertial_orbit import CACHED, INTEGRATORS, Orbit
+from navfilters.space.inertial_orbit import INTEGRATORS, Orbit
 from navfilters.space.orbit_interval import Interval
 from navfilters.space.osculating_ellipse import perigee_apogee
 from navfilters.space.pose import difference, retract
@@ -32,7 +32,6 @@ from navfilters.space.star_earth_sensor import StarEarthSensor
 from navfilters.space.thrust import COASTING, Thrust
 
 __all__ = [
-    "CACHED",
     "COASTING",
     "EARTH",
     "EARTH_RATE",

@@ -10,7 +10,7 @@ from navfilters.numerics import validation
 from navfilters.numerics.loops import is_jax, repeat
 from navfilters.space.earth_fixed_orbit import TURN, EarthFixedOrbit
 from navfilters.space.pose import difference, retract
-from navfilters.space.variations import forwards, rates, series
+from navfilters.space.variations import forwards, rates, series, to_end
 from navfilters.types import Array
 
 
@@ -79,8 +79,8 @@ class EarthFixedNavigation:
         if is_jax(x.__array_namespace__()):
             flown, F = forwards(self._step, x[..., :6], self.steps, 9)
             return self._with_attitude(flown, x), F
-        flown, to_end = self._to_end(x)
-        return self._with_attitude(flown, x), _padded(to_end[-1])
+        flown, derivatives = self._to_end(x)
+        return self._with_attitude(flown, x), _padded(derivatives[-1])
 
     def propagate(self, x: Array, Q: Array) -> tuple[Array, Array, Array]:
         """The same, and the covariance at the end of a noise that enters after every step.
@@ -106,8 +106,8 @@ class EarthFixedNavigation:
         if is_jax(x.__array_namespace__()):
             flown, F, W = forwards(self._step, x[..., :6], self.steps, 9, Q)
             return self._with_attitude(flown, x), F, W
-        flown, to_end = self._to_end(x)
-        F, of_noise = _padded(to_end[-1]), to_end[:-1]
+        flown, (*of_noise, F) = self._to_end(x)
+        F = _padded(F)
         W = self.steps * Q + 0 * F
         W[..., :6, :6] = sum(Phi @ Q[..., :6, :6] @ Phi.mT for Phi in of_noise)
         W[..., :6, 6:] = sum(of_noise) @ Q[..., :6, 6:]
@@ -123,10 +123,8 @@ class EarthFixedNavigation:
     def _to_end(self, x: Array) -> tuple[Array, list[Array]]:
         """The last position and velocity, and its derivatives by each, from last to first."""
         path = self.orbit.path(x[..., :6], self.steps)
-        to_end = [np.zeros_like(path[0])[..., None] + np.eye(6)]
-        for F in self.orbit.transitions(path)[::-1, ..., :6, :6]:
-            to_end.append(to_end[-1] @ F)
-        return path[-1], to_end
+        parts = to_end(lambda _, part: self.orbit.transitions(part)[..., :6, :6], path, 6)
+        return path[-1], list(parts)
 
     def _step(self, k: Array, x: Array) -> tuple[Array, Callable]:
         """Position and velocity a step later, and M -> F M, for JAX."""

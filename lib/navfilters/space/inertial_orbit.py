@@ -15,7 +15,7 @@ from navfilters.numerics.runge_kutta import runge_kutta
 from navfilters.space.gravity import EARTH, Gravity
 from navfilters.space.orbit_interval import Interval
 from navfilters.space.thrust import COASTING, Thrust, along_velocity
-from navfilters.space.variations import forwards, middle, rates, series
+from navfilters.space.variations import forwards, middle, rates, series, to_end
 from navfilters.types import Array
 
 
@@ -157,7 +157,8 @@ class Orbit:
         -------
         array (..., 6)
         """
-        return repeat(self._advance, x, self.substeps, x.__array_namespace__())
+        advance = partial(self._advance, self._pushes(self.start, self.substeps, x))
+        return repeat(advance, x, self.substeps, x.__array_namespace__())
 
     def transition(self, x: Array) -> tuple[Array, Array]:
         """The state at the interval's end, and its derivative with respect to x.
@@ -205,8 +206,8 @@ class Orbit:
         if is_jax(x.__array_namespace__()):
             return self._forwards(x, Q)
         states = self._states(x, self.start)
-        *to_end, F = self._to_end(states, self.start)
-        return states[-1], F, sum(Phi @ Q @ Phi.mT for Phi in reversed(to_end))
+        *later, F = self._to_end(states, self.start)
+        return states[-1], F, sum(Phi @ Q @ Phi.mT for Phi in reversed(later))
 
     def path(self, x: Array, t: Array | None = None) -> Array:
         """The states after every sub-step.
@@ -240,8 +241,8 @@ class Orbit:
         Interval
         """
         states = self._states(x, t)
-        *to_end, F = self._to_end(states, t)
-        return Interval(self, x, t, states[1:], F, to_end[::-1])
+        *later, F = self._to_end(states, t)
+        return Interval(self, x, t, states[1:], F, later[::-1])
 
     def transitions(self, path: Array, t: float = 0.0) -> Array:
         """Derivative of each state of a path with respect to the one a sub-step before.
@@ -258,56 +259,45 @@ class Orbit:
         array (k, ..., 6, 6)
         """
         xp = path.__array_namespace__()
-        times = t + self.step * (np.arange(path.shape[0] - 1) + 0.5)
-        thrust = self._push(times, path.ndim - 1)
+        thrust = self._pushes(t, path.shape[0] - 1, path[0])
         h, x = self.step, path[:-1]
         if self.integrator == "euler":
             return xp.eye(6) + h * self.jacobian(x, thrust)
         hA = h * self.jacobian(middle(x, path[1:], h), thrust)
         return xp.eye(6) + hA @ (xp.eye(6) + hA @ (xp.eye(6) / 2 + hA / 6))
 
-    def _push(self, t: Array, axes: int) -> Array | None:
-        """Strength at a time, or at one for each of some leading axes of so many; None for zero."""
-        if self.thrust.coasts:
-            return None
-        strength = self.thrust.strength(t)
-        if isinstance(strength, np.ndarray) and not strength.any():
-            return None
-        return strength[(..., *(None,) * (axes - strength.ndim))]
+    def _pushes(self, t: Array, count: int, x: Array) -> Array | None:
+        """Strength in the middle of each sub-step from t, (count, ...), for such states as x."""
+        middles = (np.arange(count) + 0.5).reshape(-1, *(1,) * np.ndim(t))
+        return self.thrust.strengths(t + self.step * middles, x)
 
-    def _advance(self, k: Array, x: Array, t: Array | None = None) -> Array:
-        """Sub-step k; its thrust is that of its middle."""
-        t = (self.start if t is None else t) + self.step * (k + 0.5)
-        derivative = partial(self.derivative, thrust=self._push(t, x.ndim - 1))
+    def _advance(self, pushes: Array | None, k: Array, x: Array) -> Array:
+        """The state after sub-step k."""
+        thrust = None if pushes is None else pushes[k]
+        if isinstance(thrust, np.ndarray | np.generic) and not thrust.any():
+            thrust = None  # saves its term
+        derivative = partial(self.derivative, thrust=thrust)
         return INTEGRATORS[self.integrator](derivative, x, self.step)
 
     def _states(self, x: Array, t: Array) -> Array:
+        pushes = self._pushes(t, self.substeps, x)
         states = [x]
         for k in range(self.substeps):
-            states.append(self._advance(k, states[-1], t))
+            states.append(self._advance(pushes, k, states[-1]))
         return x.__array_namespace__().stack(states)
 
     def _to_end(self, states: Array, t: float) -> Iterator[Array]:
-        """Derivative of the last state with respect to each, from the last to the first."""
-        xp = states.__array_namespace__()
-        Phi = xp.zeros_like(states[0])[..., None] + xp.eye(6)
-        yield Phi
-        size = max(1, CACHED // max(1, states[0, ..., 0].size))
-        for first in reversed(range(0, self.substeps, size)):
-            steps = self.transitions(states[first : first + size + 1], t + first * self.step)
-            for k in reversed(range(steps.shape[0])):
-                Phi = Phi @ steps[k]
-                yield Phi
+        return to_end(lambda k, part: self.transitions(part, t + k * self.step), states, 6)
 
     def _forwards(self, x: Array, Q: Array | None = None) -> tuple[Array, ...]:
         """f(x), F and, given Q, W, for JAX."""
+        pushes = self._pushes(self.start, self.substeps, x)
 
         def sub_step(k: Array, x: Array) -> tuple[Array, Callable]:
-            x_next = self._advance(k, x)
-            thrust, at, order = self._push(self.start + self.step * (k + 0.5), x.ndim - 1), x, 1
+            x_next, at, order = self._advance(pushes, k, x), x, 1
             if self.integrator == "rk4":
                 at, order = middle(x, x_next, self.step), 3
-            V = None if thrust is None else along_velocity(at[..., 3:], thrust)
+            V = None if pushes is None else along_velocity(at[..., 3:], pushes[k])
             A = partial(rates, self.gravity.gradient(at[..., :3]), V)
             return x_next, partial(series, A, self.step, order)
 
@@ -315,9 +305,6 @@ class Orbit:
 
 
 POSITION, VELOCITY = np.eye(6)[:3], np.eye(6)[3:]  # r = POSITION @ x; constants, not concat: faster
-
-CACHED = 2000
-"""Matrices worked on at a time: enough to amortise a call, few enough for the cache."""
 
 
 def _euler(derivative, x: Array, h: float) -> Array:

@@ -60,6 +60,28 @@ class Thrust:
         burns = xp.any((t >= xp.asarray(start)) & (t < xp.asarray(end)), axis=-1)
         return xp.where(burns, self.magnitude, 0.0)
 
+    def strengths(self, times: Array, x: Array) -> Array | None:
+        """Strength at each of a series of times, to go with states.
+
+        Parameters
+        ----------
+        times : array (k, ...)
+            Seconds; behind the first, leading axes of x.
+        x : array (..., 6)
+
+        Returns
+        -------
+        array (k, ...) or None
+            m/s^2, with axes of length one for the other axes of x; None if it does not push.
+        """
+        if self.coasts:
+            return None
+        strength = self.strength(times)
+        if isinstance(strength, np.ndarray) and not strength.any():
+            return None
+        strength = strength[(..., *(None,) * (x.ndim - strength.ndim))]
+        return x.__array_namespace__().asarray(strength)
+
 
 COASTING = Thrust(0.0, ())
 

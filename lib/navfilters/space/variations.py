@@ -1,10 +1,13 @@
 """How small differences of position and velocity grow in a step: A = [0, I; G, V], written out."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from navfilters.numerics.loops import repeat
 from navfilters.numerics.small_matrices import written_out
 from navfilters.types import Array
+
+CACHED = 2000
+"""Matrices worked on at a time: enough to amortise a call, few enough for the cache."""
 
 
 def rates(G: Array, V: Array | None, M: Array) -> Array:
@@ -82,7 +85,7 @@ def forwards(
 
     Notes
     -----
-    One loop, which JAX compiles once for all steps.
+    One loop, which JAX compiles once for all steps. NumPy is faster with :func:`to_end`.
     """
     xp = x.__array_namespace__()
     F = xp.zeros_like(x[..., :1])[..., None] + xp.eye(n)
@@ -94,6 +97,32 @@ def forwards(
         return x, grow(F), *(grow(grow(w).mT) + Q for w in W)
 
     return repeat(advance, (x, F, *W), count, xp)
+
+
+def to_end(transitions: Callable[[int, Array], Array], path: Array, n: int) -> Iterator[Array]:
+    """Derivative of a path's last state with respect to each, from the last to the first.
+
+    Parameters
+    ----------
+    transitions : callable
+        (k, a part of the path that starts with its state k) -> the derivative of each of its
+        states with respect to the one before, (..., n, n).
+    path : array (k + 1, ..., m)
+        States a step apart.
+    n : int
+
+    Yields
+    ------
+    array (..., n, n)
+    """
+    xp = path.__array_namespace__()
+    Phi = xp.zeros_like(path[0, ..., :1])[..., None] + xp.eye(n)
+    yield Phi
+    size = max(1, CACHED // max(1, path[0, ..., 0].size))
+    for first in reversed(range(0, path.shape[0] - 1, size)):
+        for F in transitions(first, path[first : first + size + 1])[::-1]:
+            Phi = Phi @ F
+            yield Phi
 
 
 def middle(x: Array, x_next: Array, h: float) -> Array:
