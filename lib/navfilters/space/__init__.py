@@ -16,7 +16,6 @@ from navfilters.space.frames import (
 from navfilters.space.gravity import EARTH, Gravity
 from navfilters.space.image_measurement import Measurement, NavigationState, SarGeometry
 from navfilters.space.inertial_orbit import INTEGRATORS, Orbit
-from navfilters.space.orbit_interval import Interval
 from navfilters.space.osculating_ellipse import perigee_apogee
 from navfilters.space.pose import difference, retract
 from navfilters.space.quaternions import (
@@ -41,7 +40,6 @@ __all__ = [
     "EarthFixedNavigation",
     "EarthFixedOrbit",
     "Gravity",
-    "Interval",
     "Measurement",
     "NavigationState",
     "Orbit",
