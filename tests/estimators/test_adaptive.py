@@ -15,7 +15,7 @@ from ruled import (
     ruled,
 )
 
-from navfilters import Filter
+from navfilters import Filter, run, sweep
 from navfilters.estimators.adaptive import AdaptiveNoise
 from navfilters.numerics.matrix_exponential import expm
 from navfilters.papers.xiong2009 import CurrentNoise
@@ -96,6 +96,17 @@ def test_the_aekf_with_memory_multiplies_its_factors_up_to_the_cap():
         spread = np.trace(state.memory.factor @ Q @ state.memory.factor.mT, axis1=-2, axis2=-1)
         assert (spread <= 1.01 * np.trace(Q) * (1 + 1e-12)).all()
     assert growth.max() > 1.01 * np.trace(Q)
+
+
+@pytest.mark.parametrize("engine", ["numpy", pytest.param("jax", marks=pytest.mark.slow)])
+def test_the_current_reading_goes_through_run_and_sweep(engine):
+    p = problem(steps=12)
+    estimator = CurrentNoise(AdaptiveNoise(a=0.5, N=5, directions=p.directions))
+    options = {"dynamics": p.dynamics, "z_per_step": True}
+    wanted = run(estimator, p.prior, p.z, p.sensor, **options)
+    got = sweep(estimator, p.prior, p.z, p.sensor, engine=engine, progress=False, **options).final
+    assert_allclose(got.mean, wanted.mean[-1], rtol=1e-9)
+    assert_allclose(got.cov, wanted.cov[-1], rtol=1e-9, atol=1e-12)
 
 
 def test_the_current_reading_multiplies_each_factor_once():
