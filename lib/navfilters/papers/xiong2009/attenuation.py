@@ -74,7 +74,7 @@ def smallest_lambda(P: Array, Sigma_bar: Array) -> Array:
 
 
 def attenuation_ratio(error: Array, *disturbances: Array) -> Array:
-    """Energy of the errors over that of the disturbances, which the REKF keeps below gamma^2.
+    """Energy of the errors over that of the disturbances.
 
     sum norm(x_t - x_hat_t)^2 / (sum norm(w_t)^2 + sum norm(Delta_t)^2 + sum norm(v_t)^2)
 

@@ -33,8 +33,7 @@ def lemma_bound(
     t : int array (...)
         Times, at least 0.
     as_printed : bool
-        Start the sum at i = 1 as the text does: too small by mu / v_min. Equality in (11) with
-        v_min = v_max exceeds it at every t >= 1.
+        Start the sum at i = 1 as the text does, which is no bound.
 
     Returns
     -------
@@ -190,8 +189,7 @@ def theorem_bound(
     t : int array (...)
         Times, at least 0.
     as_printed : bool
-        With the slips: (20) has mu_max / p_min where (A.2) and Lemma 1 give mu_max p_max (the
-        printed one is not even a square of the state's units), and starts its sum at i = 1.
+        With the slips of (20): mu_max / p_min for mu_max p_max, and a sum from i = 1.
 
     Returns
     -------
