@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters import FILTERS, Gaussian, SigmaPoints, run, sweep
-from navfilters.estimators.adaptive import AdaptiveEKF
+from navfilters import FILTERS, Filter, Gaussian, SigmaPoints, run, sweep
+from navfilters.estimators.adaptive import AdaptiveNoise
 from navfilters.estimators.continuous import extended_kalman_bucy
 from navfilters.estimators.continuous_system import ContinuousSystem
-from navfilters.estimators.robust import AdaptiveRobustEKF, RobustEKF
+from navfilters.estimators.robust import AdaptiveRobust, Robust
 from navfilters.models import RangeBearing
 from navfilters.numerics import validation
 from navfilters.runs.consistency import chi_square_band, coverage
@@ -22,6 +22,7 @@ MODEL = RangeBearing(np.diag([0.04, 1e-4]))
 PRIORS = Gaussian(np.array([[28.0, 41.0], [31.0, 38.0], [33.0, 42.0]]), 4 * np.eye(2))
 Z = np.array([50.2, 0.92])
 quiet = partial(sweep, progress=False)
+START = Filter(rule=Robust()).init(PRIORS)
 
 REAL = {
     "float32": np.float32,
@@ -50,13 +51,13 @@ OPTIONS = {
     "alpha": (0.5, lambda x: filtered(points=SigmaPoints(alpha=x))),
     "beta": (1.5, lambda x: filtered(points=SigmaPoints(beta=x))),
     "kappa": (0.5, lambda x: filtered(points=SigmaPoints(kappa=x))),
-    "gamma": (512.0, lambda x: RobustEKF(gamma=x)._enlarge(np.eye(2))[0]),
-    "a": (0.25, lambda x: AdaptiveEKF(a=x).a * 1.0),
-    "alpha of the AREKF": (0.25, lambda x: AdaptiveRobustEKF(alpha=x).alpha * 1.0),
-    "lam": (1.5, lambda x: AdaptiveRobustEKF(lam=x).lam * 1.0),
+    "gamma": (512.0, lambda x: Filter(rule=Robust(gamma=x)).update(START, Z, MODEL).estimate.cov),
+    "a": (0.25, lambda x: AdaptiveNoise(a=x).a * 1.0),
+    "alpha of the adaptive robust rule": (0.25, lambda x: AdaptiveRobust(alpha=x).alpha * 1.0),
+    "lam": (1.5, lambda x: AdaptiveRobust(lam=x).lam * 1.0),
     "step": (0.5, lambda x: Orbit(step=x, substeps=2).transition(ORBIT)[0]),
     "rate": (0.5, lambda x: EarthFixedOrbit(rate=x).acceleration(ORBIT)),
-    "k": (2.5, lambda x: coverage(np.ones((5, 2)), np.eye(2), x, runs_axis=0).expected),
+    "k": (2.5, lambda x: coverage(np.ones((5, 2)), np.eye(2), x).expected),
     "confidence": (0.875, lambda x: chi_square_band(3, 4, x)),
     "dof": (3, lambda x: chi_square_band(x)),
 }
@@ -95,8 +96,8 @@ COUNTS = {
     "chunk": (2, lambda k: quiet(FILTERS["EKF"], PRIORS, Z, MODEL, 2, chunk=k).final.mean),
     "workers": (1, lambda k: quiet(FILTERS["EKF"], PRIORS, Z, MODEL, 2, workers=k).final.mean),
     "substeps": (3, lambda k: Orbit(substeps=k).transition(ORBIT)[0]),
-    "N": (4, lambda k: AdaptiveEKF(N=k).init(PRIORS).innovations),
-    "k": (3, lambda k: AdaptiveEKF(k=k).init(PRIORS).innovations),
+    "N": (4, lambda k: AdaptiveNoise(N=k).init(PRIORS).innovations),
+    "k": (3, lambda k: AdaptiveNoise(k=k).init(PRIORS).innovations),
 }
 
 
@@ -120,15 +121,15 @@ def test_what_is_no_integer_is_refused_by_name(name, bad):
 @pytest.mark.parametrize("bad", ["yes", 1, None, np.ones(2, bool), 0.0])
 @pytest.mark.parametrize("door", [run, quiet])
 def test_a_flag_is_true_or_false(door, bad):
-    with pytest.raises(ValueError, match="z_varies must be True or False; found"):
-        door(FILTERS["EKF"], PRIORS, Z, MODEL, 2, z_varies=bad)
+    with pytest.raises(ValueError, match="z_per_step must be True or False; found"):
+        door(FILTERS["EKF"], PRIORS, Z, MODEL, 2, z_per_step=bad)
 
 
 @pytest.mark.parametrize("yes", [True, np.True_, np.array(True)])
 def test_numpys_bools_are_flags(yes):
     z = np.stack([Z, Z + 0.01])
-    got = quiet(FILTERS["EKF"], PRIORS, z, MODEL, 2, z_varies=yes).final.mean
-    assert_array_equal(got, run(FILTERS["EKF"], PRIORS, z, MODEL, 2, z_varies=yes).mean[-1])
+    got = quiet(FILTERS["EKF"], PRIORS, z, MODEL, 2, z_per_step=yes).final.mean
+    assert_array_equal(got, run(FILTERS["EKF"], PRIORS, z, MODEL, 2, z_per_step=yes).mean[-1])
 
 
 LISTS = [
@@ -187,5 +188,5 @@ def test_the_integrators_tolerances(name):
 def test_a_number_is_kept_as_pythons():
     """So that it can be hashed, compared and compiled."""
     assert type(Orbit(step=np.array(2.0)).step) is float
-    assert type(replace(AdaptiveEKF(), N=np.array(7)).N) is int
+    assert type(replace(AdaptiveNoise(), N=np.array(7)).N) is int
     assert validation.number("x", np.float32(0.5), above=0) == 0.5
