@@ -36,7 +36,7 @@ MOVED = {
     "multiplicative": "estimators.multiplicative",
     "plotting": "book.plotting",
     "probing": "numerics.probing",
-    "robust": "estimators.extended, estimators.robust, estimators.adaptive",
+    "robust": "estimators.filter, estimators.robust, estimators.adaptive",
     "sar.autofocus": "sar.images",
     "sar.echo": "sar.raw",
     "sar.focus": "sar.images",

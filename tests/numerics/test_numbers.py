@@ -54,7 +54,7 @@ OPTIONS = {
     "a": (0.25, lambda x: AdaptiveNoise(a=x).a * 1.0),
     "alpha of the adaptive robust rule": (0.25, lambda x: AdaptiveRobust(alpha=x).alpha * 1.0),
     "lam": (1.5, lambda x: AdaptiveRobust(lam=x).lam * 1.0),
-    "step": (0.5, lambda x: Orbit(step=x, substeps=2).interval(ORBIT).transition(ORBIT)[0]),
+    "step": (0.5, lambda x: Orbit(step=x, substeps=2).transition(ORBIT)[0]),
     "rate": (0.5, lambda x: EarthFixedOrbit(rate=x).acceleration(ORBIT)),
     "k": (2.5, lambda x: coverage(np.ones((5, 2)), np.eye(2), x, runs_axis=0).expected),
     "confidence": (0.875, lambda x: chi_square_band(3, 4, x)),
@@ -94,7 +94,7 @@ COUNTS = {
     "steps of a sweep": (3, lambda k: quiet(FILTERS["EKF"], PRIORS, Z, MODEL, k).final.mean),
     "chunk": (2, lambda k: quiet(FILTERS["EKF"], PRIORS, Z, MODEL, 2, chunk=k).final.mean),
     "workers": (1, lambda k: quiet(FILTERS["EKF"], PRIORS, Z, MODEL, 2, workers=k).final.mean),
-    "substeps": (3, lambda k: Orbit(substeps=k).interval(ORBIT).transition(ORBIT)[0]),
+    "substeps": (3, lambda k: Orbit(substeps=k).transition(ORBIT)[0]),
     "N": (4, lambda k: AdaptiveNoise(N=k).init(PRIORS).innovations),
     "k": (3, lambda k: AdaptiveNoise(k=k).init(PRIORS).innovations),
 }

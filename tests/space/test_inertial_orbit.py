@@ -117,10 +117,10 @@ def test_thrust_is_along_the_velocity():
 def test_transition_is_the_derivative_of_the_interval(integrator, relative, thrust):
     """Differences of fourth order are good to 1e-10 themselves; Euler's F is exact."""
     x, dynamics = states(), Orbit(thrust=thrust, integrator=integrator)
-    end, F = dynamics.interval(x).transition(x)
+    end, F = dynamics.transition(x)
     assert end.shape == (6, 6)
     steps = (np.eye(6) * 1e3 * SCALE)[:, None]
-    at = {k: dynamics.interval(x + k * steps).path[-1] for k in (-2, -1, 1, 2)}
+    at = {k: dynamics.f(x + k * steps) for k in (-2, -1, 1, 2)}
     difference = (8 * (at[1] - at[-1]) - (at[2] - at[-2])) / 12 / 1e3
     wanted = np.moveaxis(difference, 0, -1)  # columns already per SCALE
     assert_close(F * SCALE / SCALE[:, None], wanted / SCALE[:, None], relative)
@@ -128,7 +128,7 @@ def test_transition_is_the_derivative_of_the_interval(integrator, relative, thru
 
 def test_transition_tends_to_the_exact_one_with_order_two():
     x = states()
-    F = [Orbit(step=h, substeps=round(400 / h)).interval(x).F for h in (40, 20, 10, 1)]
+    F = [Orbit(step=h, substeps=round(400 / h)).transition(x)[1] for h in (40, 20, 10, 1)]
     error = [np.abs((f - F[-1]) * SCALE / SCALE[:, None]).max() for f in F[:-1]]
     assert_allclose(np.log2(error[0] / error[1]), 2, atol=0.15)
     assert_allclose(np.log2(error[1] / error[2]), 2, atol=0.15)
@@ -145,7 +145,7 @@ def test_runge_kutta_is_exact_to_micrometres(thrust):
         rtol=1e-13,
         atol=1e-10,
     )
-    error = dynamics.interval(low_orbit()).path[-1] - flight.y[:, -1]
+    error = dynamics.f(low_orbit()) - flight.y[:, -1]
     assert np.abs(error[:3]).max() < 1e-6
     assert np.abs(error[3:]).max() < 1e-9
 
@@ -153,14 +153,14 @@ def test_runge_kutta_is_exact_to_micrometres(thrust):
 def test_the_printed_euler_step_errs_by_hundreds_of_metres():
     """Eq. (35): 424 m and 0.47 m/s in 100 s."""
     x = low_orbit()
-    error = Orbit(integrator="euler").interval(x).path[-1] - Orbit().interval(x).path[-1]
+    error = Orbit(integrator="euler").f(x) - Orbit().f(x)
     assert_allclose(np.linalg.norm(error[:3]), 424, atol=1)
     assert_allclose(np.linalg.norm(error[3:]), 0.47, atol=0.005)
 
 
 def test_runge_kutta_keeps_energy_and_momentum():
     """Both integrals of the oblate problem, over 2000 s."""
-    path = Orbit(substeps=2000).interval(states()).path
+    path = Orbit(substeps=2000).path(states())
     r, v = path[..., :3], path[..., 3:]
     energy = np.sum(v * v, axis=-1) / 2 - potential(r)
     momentum = r[..., 0] * v[..., 1] - r[..., 1] * v[..., 0]
@@ -171,83 +171,60 @@ def test_runge_kutta_keeps_energy_and_momentum():
 @pytest.mark.parametrize("integrator", ["rk4", "euler"])
 @pytest.mark.parametrize("thrust", [COASTING, BURN], ids=["coasting", "burn"])
 def test_noise_accumulates_as_step_by_step(integrator, thrust):
-    """P <- F P F^T + Q over each sub-step is F P F^T + accumulate(Q) over the interval."""
+    """P <- F P F^T + Q over each sub-step is F P F^T + W over the interval."""
     whole = Orbit(thrust=thrust, Q=Q, integrator=integrator)
-    each = replace(whole, substeps=1)
     start = x = states()
     P0 = P = np.diag([25e6] * 3 + [100.0] * 3)
     for k in range(100):
-        second = each.interval(x, float(k))
-        x, F = second.transition(x)
-        P = F @ P @ F.mT + second.accumulate(second.Q, second.start)
-    interval = whole.interval(start)
-    end, F = interval.transition(start)
+        x, F, W = replace(whole, substeps=1, start=float(k)).propagate(x, Q)
+        assert_array_equal(W, np.broadcast_to(Q, W.shape))
+        P = F @ P @ F.mT + Q
+    end, F, W = whole.propagate(start, Q)
     assert_array_equal(end, x)
-    assert_array_equal(interval.Q, Q)
-    assert_close(F @ P0 @ F.mT + interval.accumulate(interval.Q, start), P, 1e-13)
-    without = interval.accumulate(Q, start)
-    assert_close(without, without.mT, 1e-14)
+    assert_close(F @ P0 @ F.mT + W, P, 1e-13)
+    assert_close(W, W.mT, 1e-14)
 
 
 def test_noise_may_be_a_batch():
     x = states(4)
     many = Q * np.array([1.0, 4.0, 9.0])[:, None, None, None]
-    interval = Orbit(Q=many).interval(x)
-    got = interval.accumulate(interval.Q, x)
-    assert got.shape == (3, 4, 6, 6)
-    assert_allclose(got[2, 1], 9 * Orbit().interval(x[1]).accumulate(Q, x[1]), rtol=1e-9)
-
-
-def test_another_state_is_propagated_anew():
-    x = states()
-    interval = Orbit(thrust=BURN).interval(x, 25.0)
-    other = x + 1.0
-    fresh = Orbit(thrust=BURN).interval(other, 25.0)
-    for got, wanted in zip(interval.transition(other), fresh.transition(other), strict=True):
-        assert_array_equal(got, wanted)
-    assert_array_equal(interval.accumulate(Q, other), fresh.accumulate(Q, other))
+    _, _, W = Orbit(Q=many).propagate(x, many)
+    assert W.shape == (3, 4, 6, 6)
+    assert_allclose(W[2, 1], 9 * Orbit().propagate(x[1], Q)[2], rtol=1e-9)
 
 
 @pytest.mark.parametrize("batch", [(), (1,), (5,), (2, 3), (0,)])
 def test_batch_axes_come_first_and_members_do_not_meet(batch):
-    x = np.resize(states(), (*batch, 6))
-    interval = Orbit(thrust=BURN, Q=Q).interval(x)
-    assert interval.path.shape == (100, *batch, 6)
-    assert interval.F.shape == (*batch, 6, 6)
+    x, orbit = np.resize(states(), (*batch, 6)), Orbit(thrust=BURN, Q=Q)
+    path, (_, F, W) = orbit.path(x), orbit.propagate(x, Q)
+    assert path.shape == (100, *batch, 6)
+    assert F.shape == W.shape == (*batch, 6, 6)
     for i in np.ndindex(batch):
-        one = Orbit(thrust=BURN, Q=Q).interval(x[i])
-        assert_array_equal(interval.path[(slice(None), *i)], one.path)
-        assert_array_equal(interval.F[i], one.F)
-        assert_array_equal(interval.accumulate(Q, x)[i], one.accumulate(Q, x[i]))
+        assert_array_equal(path[(slice(None), *i)], orbit.path(x[i]))
+        for whole, one in zip((F, W), orbit.propagate(x[i], Q)[1:], strict=True):
+            assert_array_equal(whole[i], one)
 
 
 @pytest.mark.parametrize("cached", [1, 13, 10**6])
 def test_the_size_of_the_cache_changes_nothing(monkeypatch, cached):
-    wanted = Orbit(thrust=BURN).interval(states())
+    _, wanted = Orbit(thrust=BURN).transition(states())
     monkeypatch.setattr(variations, "CACHED", cached)
-    assert_array_equal(Orbit(thrust=BURN).interval(states()).F, wanted.F)
+    assert_array_equal(Orbit(thrust=BURN).transition(states())[1], wanted)
 
 
 def test_a_member_that_fails_stays_alone():
     x = states()
     x[2] = np.nan
-    got, wanted = Orbit().interval(x), Orbit().interval(states())
+    (_, got), (_, wanted) = Orbit().transition(x), Orbit().transition(states())
     others = [0, 1, 3, 4, 5]
-    assert np.isnan(got.F[2]).any()
-    assert_array_equal(got.F[others], wanted.F[others])
+    assert np.isnan(got[2]).any()
+    assert_array_equal(got[others], wanted[others])
 
 
 def test_the_same_source_compiles_under_jax():
     dynamics, x = Orbit(thrust=Thrust(0.45, ((1, 3),)), Q=Q, substeps=4), states()
-
-    @jax.jit
-    def step(x):
-        interval = dynamics.interval(x)
-        return *interval.transition(x), interval.accumulate(interval.Q, x)
-
-    interval = dynamics.interval(x)
-    wanted = (*interval.transition(x), interval.accumulate(Q, x))
-    for got, ours in zip(step(jnp.asarray(x)), wanted, strict=True):
+    step = jax.jit(lambda x: dynamics.propagate(x, jnp.asarray(Q)))
+    for got, ours in zip(step(jnp.asarray(x)), dynamics.propagate(x, Q), strict=True):
         assert_close(np.asarray(got), ours, 1e-13)
 
 
@@ -260,12 +237,12 @@ def test_arcs_of_thrust():
 
 def test_thrust_acts_in_its_sub_steps_only():
     x = low_orbit()
-    burn, coast = (Orbit(thrust=t).interval(x).path for t in (BURN, COASTING))
+    burn, coast = (Orbit(thrust=t).path(x) for t in (BURN, COASTING))
     assert_array_equal(burn[:30], coast[:30])
     assert (burn[30] != coast[30]).any()
     gained = np.linalg.norm(burn[69, 3:]) - np.linalg.norm(coast[69, 3:])
     assert_allclose(gained, 40 * 0.45, rtol=0.01)
-    late = Orbit(thrust=BURN).interval(x, 70.0).path
+    late = Orbit(thrust=BURN).path(x, 70.0)
     assert_array_equal(late, coast)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from navfilters.estimators.rule import Rule, zeros
 from navfilters.numerics import validation
+from navfilters.numerics.matrix_exponential import expm
 from navfilters.numerics.small_matrices import right_divide
 from navfilters.types import Array, Gaussian, Moments
 
@@ -40,7 +41,8 @@ class AdaptiveNoise(Rule):
     """The rule that tunes Q by the autocorrelation of the innovations.
 
     Sigma = F P F^T + E Q_0 E^T,   E = expm(A M A^T / 2),   M = (C_1 + ... + C_k) C_0^-1,
-    C_i = (N - 1)^-1 sum of y_j y_{j-i}^T over the last N innovations y_j
+    C_i = (N - 1)^-1 sum of y_j y_{j-i}^T over the last N innovations y_j,
+    those before the step; Q_0 until N + k of them exist
 
     Parameters
     ----------
@@ -63,23 +65,6 @@ class AdaptiveNoise(Rule):
     ------
     ValueError
         Values that are not finite, or a k or N that is too small or not an integer.
-
-    Notes
-    -----
-    The printed formulas cannot be computed, and this is a reading of them, *memoryless and
-    congruent*. (A.17) with B = A^T of (44) is A M A, an (n, m) matrix on both sides of an (m, m):
-    A M A^T is meant. (45) has H M H^T with H (m, n): H^T M H is meant, and since H is about 1e-7
-    rad/m its exponent is below 1e-12 and nothing is tuned; A, which (44) defines for this, takes
-    its place. Q_t = Q_{t-1} expm(...) is not symmetric, and as a product over the steps it
-    explodes unless it is capped (``memory``, ``cap``): by default Q_0 is enlarged afresh at each
-    step, by the half exponent from both sides, which is Q_0 expm(A M A^T) when the two commute and
-    M is symmetric, and always a covariance. (46) is
-    printed for i = 1, 2 and holds for C_0 too. It ends with y_t, and whether Q_t enters the
-    prediction of t or of t + 1 is open: a prediction is made before the measurement, so the second
-    is the default, and ``current`` is the first. Until N + k innovations exist, Q is Q_0. The k
-    "in (A.16)" of section 5 is the one in (A.17).
-
-    Autocorrelations that are negative on the whole *shrink* Q; this feedback has no floor.
 
     References
     ----------
@@ -150,24 +135,4 @@ class AdaptiveNoise(Rule):
         ]
         M = right_divide(sum(C[1:]), xp.where(full, C[0], xp.eye(C[0].shape[-1])))
         A = xp.asarray(self.a)[..., None, None] * xp.asarray(self.directions)
-        return _expm(xp.where(full, A @ M @ A.mT / 2, 0.0))
-
-
-def _expm(A: Array) -> Array:
-    """Matrix exponential of a stack: Taylor to degree 14 of A / 2^s, squared s times.
-
-    Each member has its own s, with norm(A) / 2^s at most 1/2. A norm above 1024, where doubles
-    overflow, gives NaN.
-    """
-    xp = A.__array_namespace__()
-    identity = xp.eye(A.shape[-1])
-    norm = xp.max(xp.sum(xp.abs(A), axis=-1), axis=-1)
-    usable = norm <= 1024.0  # and not NaN
-    halvings = xp.ceil(xp.log2(xp.where(usable & (norm > 0.5), norm, 0.5) / 0.5))[..., None, None]
-    scaled = xp.where(usable[..., None, None], A, xp.nan) / 2**halvings
-    E = identity + scaled / 14
-    for j in range(13, 0, -1):
-        E = identity + scaled @ E / j
-    for j in range(11):
-        E = xp.where(j < halvings, E @ E, E)
-    return E
+        return expm(xp.where(full, A @ M @ A.mT / 2, 0.0))

@@ -38,20 +38,13 @@ class Robust(Rule):
     on_violation : {"skip", "nan", "raise"}
         What happens to a member whose gamma violates Eq. (23) at a step: Eq. (5) is not applied
         there (Sigma = P), the member ends, or the whole step is refused (on the host only).
-        Violations are counted in the state.
+        Violations are counted in the memory.
 
     Raises
     ------
     ValueError
         A gamma that is not positive or an unknown on_violation; from a step, with "raise", when
         gamma violates Eq. (23), naming the smallest admissible gamma at that step.
-
-    Notes
-    -----
-    Computed as P + P (gamma^2 I - P)^-1 P, which is the same matrix and keeps P's digits when gamma
-    is large; Eq. (23) is tested by a Cholesky factor of gamma^2 I - P. The text finds gamma = 8000
-    large enough for the whole of its run; that depends on the run. L = I adds a variance in square
-    metres to one in square metres per square second: gamma is one number for both.
 
     References
     ----------
@@ -101,6 +94,7 @@ class Robust(Rule):
                 f"gamma at this step is {needed:.6g}; found {np.min(self.gamma):.6g}"
             )
         forbidden = violated[..., None, None]
+        # The same matrix, and it keeps P's digits when gamma is large
         added = right_divide(weight * P, xp.where(forbidden, xp.eye(P.shape[-1]), rest)) @ P
         otherwise = P if self.on_violation == "skip" else xp.nan
         return xp.where(forbidden, otherwise, P + (added + added.mT) / 2), violated
@@ -158,21 +152,12 @@ class AdaptiveRobust(Rule):
     rho : float or array (...)
         Forgetting factor of P_y_bar, at least 0.
     lam : callable or float or array (...)
-        (P_y_bar, P_y) -> lambda (...), or a fixed lambda.
+        (P_y_bar, P_y) -> lambda (...), or a fixed lambda; below 1 it is taken as 1, and counted.
 
     Raises
     ------
     ValueError
         A negative or non-finite parameter.
-
-    Notes
-    -----
-    With the L of Eq. (24), Eq. (5) is (P^-1 - P^-1 + P^-1 / lambda)^-1 = lambda P: gamma cancels.
-    Below 1 the root in (24) is imaginary, so lambda is max(1, lam), counted. Eq. (8) defines P_y
-    from the Sigma that (26) has yet to choose; P_{t|t-1} is meant. The text after (38) compares
-    P_y_bar with P_y_bar / alpha, and remark 3 with alpha P_y; (26) itself says P_y / alpha. As (27)
-    is printed the weights of the past and of the newest are nearly equal: "rho = 0.98" remembers
-    about two innovations.
 
     References
     ----------

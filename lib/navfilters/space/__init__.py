@@ -18,7 +18,6 @@ from navfilters.space.image_measurement import Measurement, SarGeometry
 from navfilters.space.image_sensor import Pixel, SarPass
 from navfilters.space.inertial_orbit import INTEGRATORS, Orbit
 from navfilters.space.navigation_state import NavigationState
-from navfilters.space.orbit_interval import Interval
 from navfilters.space.osculating_ellipse import perigee_apogee
 from navfilters.space.pose import difference, retract
 from navfilters.space.quaternions import (
@@ -43,7 +42,6 @@ __all__ = [
     "EarthFixedNavigation",
     "EarthFixedOrbit",
     "Gravity",
-    "Interval",
     "Measurement",
     "NavigationState",
     "Orbit",

@@ -13,7 +13,6 @@ from navfilters.numerics.analytic import dot
 from navfilters.numerics.loops import is_jax, repeat
 from navfilters.numerics.runge_kutta import runge_kutta
 from navfilters.space.gravity import EARTH, Gravity
-from navfilters.space.orbit_interval import Interval
 from navfilters.space.thrust import COASTING, Thrust, along_velocity
 from navfilters.space.variations import forwards, middle, rates, series, to_end
 from navfilters.types import Array
@@ -225,24 +224,6 @@ class Orbit:
         array (substeps, ..., 6)
         """
         return self._states(x, self.start if t is None else t)[1:]
-
-    def interval(self, x: Array, t: float = 0.0) -> Interval:
-        """Propagate a state over one sampling interval, and linearise about its path.
-
-        Parameters
-        ----------
-        x : array (..., 6)
-            Position, m, and velocity, m/s, at the interval's start.
-        t : float
-            Time of the start, s, for the thrust.
-
-        Returns
-        -------
-        Interval
-        """
-        states = self._states(x, t)
-        *later, F = self._to_end(states, t)
-        return Interval(self, x, t, states[1:], F, later[::-1])
 
     def transitions(self, path: Array, t: float = 0.0) -> Array:
         """Derivative of each state of a path with respect to the one a sub-step before.

@@ -7,6 +7,7 @@ from navfilters.papers.xiong2009.attenuation import (
     smallest_lambda,
 )
 from navfilters.papers.xiong2009.cramer_rao import cramer_rao_bound
+from navfilters.papers.xiong2009.current_noise import CurrentNoise
 from navfilters.papers.xiong2009.error_bounds import (
     Assumptions,
     assumptions,
@@ -15,9 +16,27 @@ from navfilters.papers.xiong2009.error_bounds import (
     theorem_bound,
     theorem_constants,
 )
-from navfilters.papers.xiong2009.experiment import ARCSECOND, ESTIMATORS, VARIANTS, Estimator, Setup
+from navfilters.papers.xiong2009.experiment import (
+    ARCSECOND,
+    ESTIMATORS,
+    VARIANTS,
+    Estimator,
+    Setup,
+    together,
+)
+from navfilters.papers.xiong2009.mismatched import (
+    MILD,
+    TURN,
+    WILD,
+    Mismatched,
+    Simulation,
+    simulate,
+)
 from navfilters.papers.xiong2009.monte_carlo import (
     errors,
+    errors_each_second,
+    fly,
+    measurements,
     noise,
     position_errors,
     rms_error,
@@ -28,25 +47,36 @@ from navfilters.papers.xiong2009.true_flight import Truth, truth
 __all__ = [
     "ARCSECOND",
     "ESTIMATORS",
+    "MILD",
+    "TURN",
     "VARIANTS",
+    "WILD",
     "Assumptions",
+    "CurrentNoise",
     "Estimator",
+    "Mismatched",
     "Setup",
+    "Simulation",
     "Truth",
     "assumptions",
     "attenuation_ratio",
     "contraction",
     "cramer_rao_bound",
     "errors",
+    "errors_each_second",
+    "fly",
     "gamma_limits",
     "lemma_bound",
+    "measurements",
     "noise",
     "position_errors",
     "real_covariance",
     "rms_error",
     "root_mean_square",
+    "simulate",
     "smallest_lambda",
     "theorem_bound",
     "theorem_constants",
+    "together",
     "truth",
 ]

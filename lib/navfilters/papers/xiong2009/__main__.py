@@ -2,8 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -13,15 +12,20 @@ from navfilters.papers.xiong2009.monte_carlo import rms_error
 from navfilters.runs.progress import progress as progress_bar
 
 
-def table(variant: str = "A", seeds: Sequence[int] = range(20), **options: Any) -> str:
+def table(
+    variant: str = "A",
+    seeds: Sequence[int] = range(20),
+    *,
+    progress: Callable[[Iterable], Iterable] = iter,
+) -> str:
     """Table 1 beside the paper's: median and range over seeds, of each filter, m.
 
     Parameters
     ----------
-    variant : {"A", "B", "C"}
+    variant : {"A", "B", "C", "D"}
     seeds : sequence of int
-    **options
-        Those of ``rms_error``.
+    progress : callable
+        Wraps the iterable of filters.
 
     Returns
     -------
@@ -29,8 +33,8 @@ def table(variant: str = "A", seeds: Sequence[int] = range(20), **options: Any) 
         One line for each filter and each of its two sources.
     """
     lines = [f"{'':17}{'':10}" + "".join(f"{f'sigma_{i} (m)':>15}" for i in "xyzp")]
-    for name, estimator in ESTIMATORS.items():
-        ours = rms_error(name, variant, seeds, **options)
+    for name, estimator in progress(ESTIMATORS.items()):
+        ours = rms_error(name, variant, seeds)
         rows = {"median": np.median(ours, axis=0), "least": ours.min(axis=0)}
         rows |= {"largest": ours.max(axis=0), "paper": estimator.paper}
         for i, (label, row) in enumerate(rows.items()):

@@ -19,10 +19,6 @@ def real_covariance(F: Array, beta: Array, P: Array, Q: Array) -> Array:
     -------
     array (..., n, n)
 
-    Notes
-    -----
-    P stands for the covariance of the last error, which the filter computes and does not know.
-
     References
     ----------
     xiong2009, Eqs. (15), (16).
@@ -47,10 +43,6 @@ def gamma_limits(P: Array, Sigma_bar: Array) -> tuple[Array, Array]:
         where P exceeds Sigma_bar by itself. No gamma will do where the first is not below the
         second.
 
-    Notes
-    -----
-    The text after (21) calls max[eig(A)] the minimum eigenvalue; the maximum is meant.
-
     References
     ----------
     xiong2009, Eqs. (21)-(23).
@@ -73,12 +65,6 @@ def smallest_lambda(P: Array, Sigma_bar: Array) -> Array:
     array (...)
         max eig(P^-1 Sigma_bar).
 
-    Notes
-    -----
-    Where this, lambda*, exceeds 1, Eq. (47) with the true covariance of the innovations falls short
-    of it: tr P_y_bar = tr(H Sigma_bar H^T + R) <= lambda* tr(H P H^T) + tr R < lambda* tr P_y. With
-    the estimate (27) it may exceed lambda* or not.
-
     References
     ----------
     xiong2009, Eq. (25).
@@ -88,7 +74,7 @@ def smallest_lambda(P: Array, Sigma_bar: Array) -> Array:
 
 
 def attenuation_ratio(error: Array, *disturbances: Array) -> Array:
-    """Energy of the errors over that of the disturbances, which the REKF keeps below gamma^2.
+    """Energy of the errors over that of the disturbances.
 
     sum norm(x_t - x_hat_t)^2 / (sum norm(w_t)^2 + sum norm(Delta_t)^2 + sum norm(v_t)^2)
 
@@ -103,14 +89,6 @@ def attenuation_ratio(error: Array, *disturbances: Array) -> Array:
     Returns
     -------
     array (...)
-
-    Notes
-    -----
-    For the printed ratio give w, Delta and v as they are: no two of the energies of x, w and v need
-    have the same units, the initial error is missing, and nothing bounds it by gamma^2. What the
-    recursion (3)-(9) guarantees on a linear system, for *any* disturbance, is the ratio with the
-    *predicted* errors x_t - x_{t|t-1} above, and Q^(-1/2) w_t, R^(-1/2) v_t and
-    P^(-1/2) (x - x_hat) of the first prediction below, as long as (23) holds at every step.
 
     References
     ----------

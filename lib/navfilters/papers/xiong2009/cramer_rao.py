@@ -21,22 +21,22 @@ def cramer_rao_bound(
 ) -> Array:
     """Smallest deviation of each position component of an unbiased estimate, at each second.
 
-    J_t = (F J_{t-1}^-1 F^T + Q)^-1 + H^T R^-1 H   along the true flight.
+    J_t = (F J_{t-1}^-1 F^T + Q)^-1 + H^T R^-1 H   along the true flight,
+    the first estimate with its P0 counted as one more measurement
 
     Parameters
     ----------
     variant : str or Setup
         A key of ``VARIANTS``, or a set-up of one noise.
     thrust : {"known", "unknown"}
-        Unknown: whoever estimates knows when the thruster fires, but in each sampling interval
-        with fire its acceleration is another unknown constant vector: one model of ignorance.
-        Whoever knows its direction and that its strength is constant can have far less.
+        Unknown: in each sampling interval with fire its acceleration is another unknown constant
+        vector, appended to the state.
     process_noise : bool
         Without, the limit of the experiment, whose truth has none; with the filters' Q, the limit
         for an orbit that is disturbed as the filters believe.
     acceleration : float, optional
         Deviation of each component of the unknown acceleration, m/s^2, up to 1000. By default the
-        true thrust's strength; 100 times as much raises the bound by 2 percent.
+        true thrust's strength.
 
     Returns
     -------
@@ -47,14 +47,6 @@ def cramer_rao_bound(
     ------
     ValueError
         An unknown variant or thrust, or an acceleration out of range.
-
-    Notes
-    -----
-    The classical bound at one flight, with the first estimate as one more measurement: the
-    covariance half of a Kalman filter that is linearised at the truth. P0 is that of (40), though
-    the first error (39) is not random. An unknown acceleration is appended to
-    the state. At measurement times alone, reading A has 650.6 m without and 682.0 m with Q; between
-    them the uncertainty is a little larger.
     """
     setup = _variant(variant)
     if thrust not in ("known", "unknown"):

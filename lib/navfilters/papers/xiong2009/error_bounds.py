@@ -33,8 +33,7 @@ def lemma_bound(
     t : int array (...)
         Times, at least 0.
     as_printed : bool
-        Start the sum at i = 1 as the text does: too small by mu / v_min. Equality in (11) with
-        v_min = v_max exceeds it at every t >= 1.
+        Start the sum at i = 1 as the text does, which is no bound.
 
     Returns
     -------
@@ -99,11 +98,9 @@ def assumptions(F: Array, beta: Array, H: Array, P: Array, R: Array, Q: Array) -
     -------
     Assumptions
 
-    Notes
-    -----
-    (17) prints h_min^2 I <= H H^T; (A.14) uses it as h_min^2 I <= H^T H. The two agree when H is
-    square. With fewer measurements than states the second has h_min = 0, and (A.14) says nothing;
-    V then contracts by what Q adds: see ``contraction``.
+    References
+    ----------
+    xiong2009, Eqs. (17), (18).
     """
     m, n = H.shape[-2:]
     f, b, h = (np.linalg.svd(A, compute_uv=False) for A in (F, beta, H))
@@ -166,14 +163,6 @@ def theorem_constants(a: Assumptions) -> tuple[float, float]:
     tuple of float
         (lambda_min, mu_max).
 
-    Notes
-    -----
-    The proof reaches lambda_min through the lambda_t of (A.11), which may be smaller. The rate
-    holds all the same. With the Sigma of the step, (I - K H)^T P^-1 (I - K H) =
-    (Sigma + Sigma H^T R^-1 H Sigma)^-1 <= Sigma^-1 / (1 + s), where
-    s = h_min^2 p_min (beta_min f_min)^2 / r_max because Sigma > beta F P F^T beta, Eq. (19). So V
-    contracts by s / (1 + s), which is never below lambda_min.
-
     References
     ----------
     xiong2009, Eqs. (A.12), (A.14), (A.15).
@@ -200,8 +189,7 @@ def theorem_bound(
     t : int array (...)
         Times, at least 0.
     as_printed : bool
-        With the slips: (20) has mu_max / p_min where (A.2) and Lemma 1 give mu_max p_max (the
-        printed one is not even a square of the state's units), and starts its sum at i = 1.
+        With the slips of (20): mu_max / p_min for mu_max p_max, and a sum from i = 1.
 
     Returns
     -------

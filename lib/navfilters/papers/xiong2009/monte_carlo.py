@@ -5,9 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from navfilters.numerics.allocator import keep_freed_memory
 from navfilters.papers.xiong2009.experiment import ESTIMATORS, VARIANTS, Setup, _named, _variant
 from navfilters.papers.xiong2009.true_flight import truth
+from navfilters.runs import records
+from navfilters.runs.loop import run
+from navfilters.space.inertial_orbit import Orbit
 from navfilters.space.thrust import COASTING
 from navfilters.types import Array
 
@@ -43,6 +45,93 @@ def noise(seeds: Iterable[int], setup: Setup = VARIANTS["A"]) -> Array:
     return np.stack([stream.standard_normal((updates, m)) for stream in streams], axis=1)
 
 
+def measurements(setup: Setup = VARIANTS["A"], seeds: Iterable[int] = range(20)) -> Array:
+    """What the sensor measures along the true flight.
+
+    Parameters
+    ----------
+    setup : Setup
+    seeds : iterable of int
+
+    Returns
+    -------
+    array (updates, ..., seeds, m)
+        The angles, rad: (38) with ``noise``. The axes between are those of the set-up's noises.
+    """
+    perfect = setup.sensor.h(truth(setup).states[setup.interval :: setup.interval])
+    sigma = setup.sigma[..., None]
+    return np.stack([z + sigma * v for z, v in zip(perfect, noise(seeds, setup), strict=True)])
+
+
+def fly(
+    estimator: Any,
+    setup: Setup = VARIANTS["A"],
+    seeds: Iterable[int] = range(20),
+    *,
+    knows_thrust: bool = False,
+    record: Callable[[Any], Any] = records.estimate,
+) -> Any:
+    """A filter through the flight, all seeds in one batch.
+
+    Parameters
+    ----------
+    estimator : Filter
+        With any tuning; tuning arrays (..., 1) put their axes in front of the seeds.
+    setup : Setup
+    seeds : iterable of int
+    knows_thrust : bool
+        Whether the filter's dynamics have the true thrust.
+    record : callable
+        What to keep of each state, as of ``run``.
+
+    Returns
+    -------
+    Gaussian
+        mean (updates + 1, ..., seeds, 6), m and m/s, and cov (updates + 1, ..., seeds, 6, 6) after
+        each update, the first estimate in front; or as ``record`` returns it. Not finite from where
+        a member failed.
+    """
+    z = measurements(setup, seeds)
+    orbit = _orbit(setup, knows_thrust)
+    return run(
+        estimator, setup.prior, z, setup.sensor, dynamics=orbit, z_per_step=True, record=record
+    )
+
+
+def errors_each_second(
+    mean: Array, setup: Setup = VARIANTS["A"], *, knows_thrust: bool = False, since: int = 0
+) -> Array:
+    """Position errors at every whole second of a flight, from its estimates at the updates.
+
+    Parameters
+    ----------
+    mean : array (updates + 1, ..., 6)
+        Estimates, m and m/s, the first in front: ``fly(...).mean``.
+    setup : Setup
+    knows_thrust : bool
+        As of the flight.
+    since : int
+        First second to be kept.
+
+    Returns
+    -------
+    array (duration + 1 - since, ..., 3)
+        Truth minus estimate, m: of predictions between the measurements, and of the updated
+        estimate at their times.
+    """
+    first = max(0, -(-since // setup.interval) - 1)  # the interval that since ends or lies in
+    starts, every = mean[first:-1], round(1 / setup.step)
+    times = setup.interval * np.arange(first, len(mean) - 1.0)
+    with np.errstate(all="ignore"):  # a member that fails is not finite in the result
+        path = _orbit(setup, knows_thrust).path(starts, times)[every - 1 :: every, ..., :3]
+    path[-1] = mean[first + 1 :, ..., :3]
+    seconds = np.swapaxes(path, 0, 1).reshape(-1, *path.shape[2:])
+    kept = setup.duration + 1 - since
+    estimate = np.concatenate([starts[:1, ..., :3], seconds])[-kept:]
+    true = truth(setup).states[-kept:, :3]
+    return true.reshape(kept, *(1,) * (estimate.ndim - 2), 3) - estimate
+
+
 def errors(
     estimator: Any,
     setup: Setup = VARIANTS["A"],
@@ -50,55 +139,32 @@ def errors(
     *,
     knows_thrust: bool = False,
     since: int = 0,
-    progress: Callable[[Iterable], Iterable] = iter,
 ) -> Array:
     """Position error of a filter at every whole second, all seeds in one batch.
 
     Parameters
     ----------
-    estimator : ExtendedKalman, RobustEKF, AdaptiveEKF or AdaptiveRobustEKF
-        With any tuning; tuning arrays (..., 1) put their axes in front of the seeds.
-    setup : Setup
-    seeds : iterable of int
-    knows_thrust : bool
-        Whether the filter's dynamics have the true thrust.
+    estimator, setup, seeds, knows_thrust
+        As of :func:`fly`.
     since : int
         First second to be kept.
-    progress : callable
-        Wraps the iterable of updates.
 
     Returns
     -------
     array (duration + 1 - since, ..., seeds, 3)
-        Truth minus estimate, m: of predictions between the measurements, and of the updated
-        estimate at their times. Not finite from where a member failed.
+        As of :func:`errors_each_second`; not finite from where a member failed.
     """
-    keep_freed_memory()
-    flight, sensor, every = truth(setup), setup.sensor, round(1 / setup.step)
-    orbit = setup.orbit(flight.thrust if knows_thrust else COASTING)
-    v, sigma = noise(seeds, setup), setup.sigma[..., None]
-    perfect = sensor.h(flight.states[setup.interval :: setup.interval])
-    state = estimator.init(setup.prior)
-    path = [state.estimate.mean[None, :3]]
-    with np.errstate(all="ignore"):  # a member that fails is not finite in the result
-        for k in progress(range(len(perfect))):
-            t = k * setup.interval
-            interval = orbit.interval(state.estimate.mean, float(t))
-            state = estimator.step(state, perfect[k] + sigma * v[k], interval, sensor)
-            if t + setup.interval >= since:
-                seconds = interval.path[every - 1 :: every, ..., :3]
-                path += [seconds[:-1], state.estimate.mean[None, ..., :3]]
-    batch = state.estimate.mean.shape[:-1]
-    kept = setup.duration + 1 - since
-    estimate = np.concatenate([_in_batch(p, batch) for p in path])[-kept:]
-    return _in_batch(flight.states[-kept:, :3], batch) - estimate
+    mean = fly(estimator, setup, seeds, knows_thrust=knows_thrust, record=_mean)
+    return errors_each_second(mean, setup, knows_thrust=knows_thrust, since=since)
 
 
-def _in_batch(path: Array, batch: tuple[int, ...]) -> Array:
-    """A path (t, ..., 3) with all batch axes behind that of time."""
-    missing = len(batch) + 2 - path.ndim
-    path = path.reshape(len(path), *(1,) * missing, *path.shape[1:])
-    return np.broadcast_to(path, (len(path), *batch, 3))
+def _orbit(setup: Setup, knows_thrust: bool) -> Orbit:
+    """The filter's dynamics."""
+    return setup.orbit(truth(setup).thrust if knows_thrust else COASTING)
+
+
+def _mean(state: Any) -> Array:
+    return state.estimate.mean
 
 
 def root_mean_square(error: Array) -> Array:
@@ -122,25 +188,17 @@ def root_mean_square(error: Array) -> Array:
     return np.sqrt(np.concatenate([squares, total], axis=-1))
 
 
-def rms_error(
-    filter_name: str,
-    variant: str = "A",
-    seeds: Iterable[int] = range(20),
-    *,
-    progress: Callable[[Iterable], Iterable] = iter,
-) -> Array:
+def rms_error(filter_name: str, variant: str = "A", seeds: Iterable[int] = range(20)) -> Array:
     """RMS position errors of one filter over the last 2000 s, a row of Table 1 for each seed.
 
     Parameters
     ----------
     filter_name : str
         A key of ``ESTIMATORS``.
-    variant : {"A", "B", "C"}
+    variant : {"A", "B", "C", "D"}
         The reading of the noise, a key of ``VARIANTS``.
     seeds : iterable of int
         One run each.
-    progress : callable
-        Wraps the iterable of updates.
 
     Returns
     -------
@@ -163,7 +221,6 @@ def rms_error(
         seeds,
         knows_thrust=estimator.knows_thrust,
         since=setup.duration - setup.window,
-        progress=progress,
     )
     with np.errstate(all="ignore"):
         return root_mean_square(error)
@@ -178,7 +235,7 @@ def position_errors(
     ----------
     filter_name : str
         A key of ``ESTIMATORS``.
-    variant : {"A", "B", "C"}
+    variant : {"A", "B", "C", "D"}
         A key of ``VARIANTS``.
     seeds : iterable of int
 

@@ -1,0 +1,120 @@
+"""The set-up of section 5, its true flight and its noise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from navfilters.papers.xiong2009 import (
+    VARIANTS,
+    Setup,
+    cramer_rao_bound,
+    measurements,
+    noise,
+    position_errors,
+    rms_error,
+    together,
+    truth,
+)
+from navfilters.space import EARTH, Orbit, perigee_apogee
+
+pytestmark = pytest.mark.slow
+
+SHORT = Setup(duration=2000, window=500, burns=((700, 900),), thrust=0.45)
+
+
+def test_constants_of_section_5():
+    setup = Setup()
+    assert_allclose(setup.x0[:3], [6878137, 0, 0])
+    assert_allclose(np.arctan2(setup.x0[5], setup.x0[4]), np.deg2rad(27))
+    assert_allclose(setup.prior.mean, setup.x0 - ([5000] * 3 + [10] * 3))
+    assert_array_equal(setup.prior.cov, np.diag([25e6] * 3 + [100] * 3))
+    assert_allclose(setup.orbit().Q, np.diag([4e-10] * 3 + [4e-8] * 3))
+    assert setup.orbit().substeps == 100
+    arcseconds = {name: v.sigma * 648000 / np.pi for name, v in VARIANTS.items()}
+    assert_allclose([arcseconds[v] for v in "ABCD"], [72.17, 5, 72.17, 24.06], atol=0.01)
+    assert_allclose(VARIANTS["C"].orbit().Q[5, 5], (13 * 2e-4) ** 2)
+
+
+def test_the_thrust_reaches_the_perigee():
+    """2000 km when the last burn ends, by 0.45280 m/s^2; the apogee is then at 2682 km."""
+    flight = truth()
+    assert_allclose(flight.thrust.magnitude, 0.45280, atol=5e-6)
+    low, high = perigee_apogee(flight.states[12068])
+    assert_allclose(low, 2000e3, atol=1e-3)
+    assert_allclose(high, 2682e3, atol=1e3)
+    assert flight.states.shape == (20001, 6)
+    assert truth(VARIANTS["B"]) is flight  # computed once
+
+
+def test_the_truth_is_the_runge_kutta_path():
+    """A second integrator at 1 s agrees to 1e-4 m through both burns."""
+    flight = truth()
+    path = Orbit(EARTH, flight.thrust, substeps=12200).path(flight.states[0])
+    error = np.abs(path - flight.states[1:12201])
+    assert error[:, :3].max() < 1e-4
+    assert error[:, 3:].max() < 1e-7
+
+
+def test_without_burns_energy_and_momentum_are_kept():
+    flight = truth(Setup(burns=()))
+    r, v = flight.states[:, :3], flight.states[:, 3:]
+    energy = np.sum(v * v, axis=1) / 2 - EARTH.potential(r)
+    momentum = r[:, 0] * v[:, 1] - r[:, 1] * v[:, 0]
+    assert flight.thrust.magnitude == 0
+    assert_allclose(energy, energy[0], rtol=1e-11)
+    assert_allclose(momentum, momentum[0], rtol=1e-11)
+
+
+def test_noise_is_the_seeds_own():
+    v = noise([5, 3])
+    assert v.shape == (200, 2, 2)
+    assert_array_equal(v[:, 1], np.random.default_rng(3).standard_normal((200, 2)))
+    assert_array_equal(noise([3])[:, 0], v[:, 1])
+
+
+def test_measurements_are_the_angles_with_the_noise_of_each_reading():
+    setup = replace(together(), duration=2000, window=500, burns=(), thrust=0.0)
+    z = measurements(setup, [5, 3])
+    assert z.shape == (20, 4, 2, 2)
+    angles = setup.sensor.h(truth(setup).states[100::100])
+    for i, name in enumerate("ABCD"):
+        sigma = VARIANTS[name].sigma
+        assert_allclose((z[:, i] - angles[:, None]) / sigma, noise([5, 3], setup), atol=1e-9)
+
+
+def test_readings_together_are_the_readings():
+    both = together("CD")
+    for i, name in enumerate("CD"):
+        one = VARIANTS[name]
+        assert_array_equal(both.sensor.R[i, 0], one.sensor.R)
+        assert_array_equal(both.orbit().Q[i, 0], one.orbit().Q)
+
+
+REFUSED = {
+    "filter": (lambda: rms_error("UKF"), r"filter_name must be one of .*'AREKF'.*found 'UKF'"),
+    "variant": (lambda: rms_error("EKF", "E"), r"variant must be .*'A', 'B', 'C', 'D'\]; found"),
+    "reading": (lambda: together("AX"), "variant must be one of .*found 'X'"),
+    "no seeds": (lambda: rms_error("EKF", seeds=[]), "seeds must be .*found none"),
+    "negative seed": (lambda: rms_error("EKF", seeds=[-1]), "seeds must be integers .*found"),
+    "half a seed": (lambda: position_errors("EKF", seeds=[0.5]), "seeds must be integers"),
+    "seeds: a number": (lambda: rms_error("EKF", seeds=3), "seeds must be integers .*found 3"),
+    "bound's thrust": (lambda: cramer_rao_bound(thrust="no"), "thrust must be one of.*found 'no'"),
+    "acceleration": (lambda: cramer_rao_bound(acceleration=-1.0), "acceleration must be .*-1"),
+    "interval": (lambda: Setup(interval=300), "interval must divide duration; found 300"),
+    "step": (lambda: Setup(step=2.0), "step must be a second or .*found 2"),
+    "window": (lambda: Setup(window=30000), "window must be .*found 30000"),
+    "perigee": (lambda: truth(replace(SHORT, thrust=None)), "perigee must be reached"),
+    "thrust": (
+        lambda: truth(replace(SHORT, thrust=-1.0)),
+        "magnitude must be at least 0; found -1",
+    ),
+    "burns": (lambda: truth(Setup(burns=((0, 30000),))), "burns must be within"),
+}
+
+
+@pytest.mark.parametrize(("call", "message"), REFUSED.values(), ids=REFUSED)
+def test_bad_input_is_refused_by_name(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
