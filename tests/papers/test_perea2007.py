@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters import FILTERS, Gaussian, run
+from navfilters import Gaussian, run
 from navfilters.models import RangeBearing
-from navfilters.papers.perea2007.experiment import Setup, improvement, isotropic, position_error
+from navfilters.papers.perea2007 import (
+    FILTERS,
+    Setup,
+    improvement,
+    isotropic,
+    position_error,
+)
 
 STEPS = [1, 2, 10, 100, 1000]
 
