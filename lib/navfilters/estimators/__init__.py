@@ -1,1 +1,52 @@
 """Filters: moments, variants, rules, and the update that they share."""
+
+from navfilters.estimators.adaptive import AdaptiveNoise
+from navfilters.estimators.any_filter import as_filter
+from navfilters.estimators.catalogue import FILTERS
+from navfilters.estimators.filter import Filter
+from navfilters.estimators.moments import (
+    linearized,
+    second_order,
+    second_order_bias,
+    unscented,
+)
+from navfilters.estimators.robust import AdaptiveRobust, Robust, trace_ratio
+from navfilters.estimators.rule import Rule
+from navfilters.estimators.sigma_points import SigmaPoints, sigma_points
+from navfilters.estimators.state import FilterState
+from navfilters.estimators.update import kalman_update
+from navfilters.estimators.variants import (
+    bump_circular,
+    bump_equivalent,
+    bump_linear,
+    bump_predicted,
+    bump_state,
+    expect_at_mean,
+    unchanged,
+)
+
+__all__ = [
+    "FILTERS",
+    "AdaptiveNoise",
+    "AdaptiveRobust",
+    "Filter",
+    "FilterState",
+    "Robust",
+    "Rule",
+    "SigmaPoints",
+    "as_filter",
+    "bump_circular",
+    "bump_equivalent",
+    "bump_linear",
+    "bump_predicted",
+    "bump_state",
+    "expect_at_mean",
+    "kalman_update",
+    "linearized",
+    "second_order",
+    "second_order_bias",
+    "sigma_points",
+    "trace_ratio",
+    "unchanged",
+    "unscented",
+]
