@@ -27,21 +27,21 @@ def test_one_point_of_each_map_is_a_run_from_there():
     h = run(
         FILTERS["UKFz"], isotropic(divergence_maps.starts(4)[2, 1], 100.0), setup.z, setup.model, 30
     )
-    I = divergence_maps.over_starts("UKFz", 4, steps=30)
+    I = divergence_maps.over_starts(FILTERS["UKFz"], 4, steps=30)
     assert_allclose(I[2, 1], improvement(h, setup.x_true), rtol=1e-9)
 
     sigma, ratio = divergence_maps.noises(4)
     R = np.diag([setup.bearing_variance * ratio[2] ** 2, setup.bearing_variance])
     model = RangeBearing(R, wrap=False)
     h = run(FILTERS["EKF"], isotropic(setup.x0, sigma[1]), setup.z, model, 30)
-    I = divergence_maps.over_noises("EKF", 4, steps=30)
+    I = divergence_maps.over_noises(FILTERS["EKF"], 4, steps=30)
     assert_allclose(I[2, 1], improvement(h, setup.x_true), rtol=1e-9)
 
 
 def test_a_last_bit_is_one_and_changes_the_map_a_little():
     assert_array_equal(divergence_maps.next_bit([1.0, -1.0]), [1 + 2**-52, -1 + 2**-53])
-    I = divergence_maps.over_starts("B-EKF 2", 4, steps=20)
-    changed = divergence_maps.over_starts("B-EKF 2", 4, steps=20, changed=True)
+    I = divergence_maps.over_starts(FILTERS["B-EKF 2"], 4, steps=20)
+    changed = divergence_maps.over_starts(FILTERS["B-EKF 2"], 4, steps=20, changed=True)
     assert 0 < np.abs(changed / I - 1).max() < 1e-9
 
 
@@ -56,9 +56,12 @@ def test_the_command_stores_every_map(tmp_path, capsys):
     command.main(["--size", "3", "--steps", "2", "--out", str(out)])
     stored = np.load(f"{out}.npz")
     assert len(stored.files) == 4 * len(FILTERS)
-    assert_array_equal(stored["starts mtSOF"], divergence_maps.over_starts("mtSOF", 3, steps=2))
     assert_array_equal(
-        stored["noises changed UKF"], divergence_maps.over_noises("UKF", 3, changed=True, steps=2)
+        stored["starts mtSOF"], divergence_maps.over_starts(FILTERS["mtSOF"], 3, steps=2)
+    )
+    assert_array_equal(
+        stored["noises changed UKF"],
+        divergence_maps.over_noises(FILTERS["UKF"], 3, changed=True, steps=2),
     )
     assert sorted(p.suffix for p in out.parent.iterdir()) == [".npz"] + [".png"] * 4
     assert "UKFz: " in capsys.readouterr().out

@@ -5,7 +5,7 @@ from typing import Any, Literal
 import numpy as np
 
 from navfilters.models import RangeBearing
-from navfilters.papers.perea2007.experiment import FILTERS, Setup, isotropic, position_error
+from navfilters.papers.perea2007.experiment import Setup, isotropic, position_error
 from navfilters.runs.sweeping import sweep
 from navfilters.types import Array, Gaussian
 
@@ -71,7 +71,7 @@ def next_bit(mean: Any) -> Array:
 
 
 def indicator(
-    name: str,
+    estimator: Any,
     mean: Any,
     sigma: Any = Setup.sigma,
     R: Any = None,
@@ -81,12 +81,11 @@ def indicator(
     workers: int | None = 1,
     progress: bool = False,
 ) -> Array:
-    """I of one filter: the last error over the first.
+    """I of a filter: the last error over the first.
 
     Parameters
     ----------
-    name : str
-        A key of ``FILTERS``.
+    estimator : Filter, or whatever ``navfilters.sweep`` takes
     mean : array-like (..., 2)
         First estimate, units.
     sigma : array-like (...)
@@ -110,7 +109,7 @@ def indicator(
     shape = np.broadcast_shapes(mean.shape[:-1], np.shape(sigma))
     priors = isotropic(np.broadcast_to(mean, (*shape, 2)), np.broadcast_to(sigma, shape))
     end: Gaussian = sweep(
-        FILTERS[name],
+        estimator,
         priors,
         setup.z,
         setup.model if R is None else RangeBearing(R, wrap=False),
@@ -122,12 +121,12 @@ def indicator(
     return position_error(end.mean, setup.x_true) / position_error(mean, setup.x_true)
 
 
-def over_starts(name: str, size: int, *, changed: bool = False, **options: Any) -> Array:
+def over_starts(estimator: Any, size: int, *, changed: bool = False, **options: Any) -> Array:
     """I over the plane of first estimates.
 
     Parameters
     ----------
-    name : str
+    estimator : Filter
     size : int
     changed : bool
         Whether the first estimates are changed in their last bit.
@@ -139,15 +138,15 @@ def over_starts(name: str, size: int, *, changed: bool = False, **options: Any) 
     array (size, size)
     """
     mean = starts(size)
-    return indicator(name, next_bit(mean) if changed else mean, **options)
+    return indicator(estimator, next_bit(mean) if changed else mean, **options)
 
 
-def over_noises(name: str, size: int, *, changed: bool = False, **options: Any) -> Array:
+def over_noises(estimator: Any, size: int, *, changed: bool = False, **options: Any) -> Array:
     """I from the paper's first estimate, over its deviation and the ratio of the noises.
 
     Parameters
     ----------
-    name : str
+    estimator : Filter
     size : int
     changed : bool
         Whether the first estimate is changed in its last bit.
@@ -164,7 +163,7 @@ def over_noises(name: str, size: int, *, changed: bool = False, **options: Any) 
     R[..., 1, 1] = setup.bearing_variance
     R[:, 0, 0, 0] = setup.bearing_variance * ratio**2
     mean = np.asarray(setup.x0)
-    return indicator(name, next_bit(mean) if changed else mean, sigma, R, **options)
+    return indicator(estimator, next_bit(mean) if changed else mean, sigma, R, **options)
 
 
 def relative_change(I: Any, changed: Any) -> Array:
