@@ -54,15 +54,16 @@ def test_a_change_is_relative_and_has_a_floor():
 def test_the_command_stores_every_map(tmp_path, capsys):
     out = tmp_path / "new" / "m"
     command.main(["--size", "3", "--steps", "2", "--out", str(out)])
-    stored = np.load(f"{out}.npz")
-    assert len(stored.files) == 4 * len(FILTERS)
-    assert_array_equal(
-        stored["starts mtSOF"], divergence_maps.over_starts(FILTERS["mtSOF"], 3, steps=2)
-    )
-    assert_array_equal(
-        stored["noises changed UKF"],
-        divergence_maps.over_noises(FILTERS["UKF"], 3, changed=True, steps=2),
-    )
+    with np.load(f"{out}.npz") as stored:
+        assert len(stored.files) == 4 * len(FILTERS)
+        for key, expected in (
+            ("starts mtSOF", divergence_maps.over_starts(FILTERS["mtSOF"], 3, steps=2)),
+            (
+                "noises changed UKF",
+                divergence_maps.over_noises(FILTERS["UKF"], 3, changed=True, steps=2),
+            ),
+        ):
+            assert_array_equal(stored[key], expected)
     assert sorted(p.suffix for p in out.parent.iterdir()) == [".npz"] + [".png"] * 4
     assert "UKFz: " in capsys.readouterr().out
 
