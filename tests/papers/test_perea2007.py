@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters import FILTERS, Gaussian, run
+from navfilters import Gaussian, run
 from navfilters.models import RangeBearing
-from navfilters.papers.perea2007.experiment import Setup, improvement, isotropic, position_error
+from navfilters.papers.perea2007 import (
+    FILTERS,
+    Setup,
+    deviations,
+    improvement,
+    isotropic,
+    position_error,
+)
 
 STEPS = [1, 2, 10, 100, 1000]
 
@@ -81,6 +88,12 @@ def test_position_error_is_the_distance():
     assert_array_equal(
         position_error(np.zeros((2, 3, 2)), [[3, 4], [6, 8], [0, 1]]), [[5, 10, 1]] * 2
     )
+
+
+def test_deviations_are_counted_along_the_axes_and_of_any_symmetric_matrix():
+    cov = np.array([np.diag([4.0, 1.0]), np.diag([4.0, 1.0]), np.diag([-4.0, 1.0])])
+    mean = np.array([[2.0, 0.0], [0.0, 3.0], [2.0, 0.0]])
+    assert_allclose(deviations(Gaussian(mean, cov), (0.0, 0.0)), [1.0, 3.0, 1.0])
 
 
 def test_improvement_is_the_last_error_over_the_first():

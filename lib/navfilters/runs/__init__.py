@@ -1,5 +1,7 @@
 """Runs: one history, or many configurations, on either engine; and tests of consistency."""
 
+from navfilters.runs import records
+from navfilters.runs.chunks import SweepError
 from navfilters.runs.consistency import (
     chi_square_band,
     coverage,
@@ -8,5 +10,22 @@ from navfilters.runs.consistency import (
     nis,
     sample_deviation,
 )
+from navfilters.runs.loop import first_indefinite, run
+from navfilters.runs.records import Distance
+from navfilters.runs.sweeping import Sweep, sweep
 
-__all__ = ["chi_square_band", "coverage", "mean_nees", "nees", "nis", "sample_deviation"]
+__all__ = [
+    "Distance",
+    "Sweep",
+    "SweepError",
+    "chi_square_band",
+    "coverage",
+    "first_indefinite",
+    "mean_nees",
+    "nees",
+    "nis",
+    "records",
+    "run",
+    "sample_deviation",
+    "sweep",
+]

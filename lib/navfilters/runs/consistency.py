@@ -9,7 +9,6 @@ Runs that are not finite are left out and counted. For the host: NumPy and scipy
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import stats
 
 from navfilters.numerics import validation
 from navfilters.numerics.small_matrices import cholesky
@@ -94,6 +93,8 @@ def chi_square_band(dof: int, runs: Any = 1, confidence: float = 0.95) -> tuple[
     if one < 1 or np.any(many < 1):
         raise ValueError(f"dof and runs must be at least 1; found {dof} and {np.min(runs)}")
     total = one * many
+    from scipy import stats  # it takes longer to import than the rest of the library
+
     return tuple(stats.chi2.ppf(p, total) / many for p in (tail, 1 - tail))
 
 
@@ -199,6 +200,8 @@ def sample_deviation(
     mean = np.sum(np.where(keep, error, 0.0), axis=0) / k
     sample = np.sqrt(np.sum(np.where(keep, error - mean, 0.0) ** 2, axis=0) / (k - 1))
     variance = np.where(keep, np.diagonal(cov, axis1=-2, axis2=-1), 0.0)
+    from scipy import stats
+
     low, high = (sample * np.sqrt((k - 1) / stats.chi2.ppf(p, k - 1)) for p in (1 - tail, tail))
     return SampleDeviation(mean, sample, low, high, np.sqrt(np.sum(variance, axis=0) / k), runs)
 
@@ -256,6 +259,8 @@ def coverage(
     n = runs[..., None]
     variance = np.diagonal(cov, axis1=-2, axis2=-1)
     hits = np.sum(used[..., None] & (error**2 <= k * k * variance), axis=0)
+    from scipy import stats
+
     low = np.where(hits > 0, stats.beta.ppf(tail, np.maximum(hits, 1), n - hits + 1), 0.0)
     high = np.where(hits < n, stats.beta.ppf(1 - tail, hits + 1, np.maximum(n - hits, 1)), 1.0)
     expected = float(stats.chi2.cdf(k * k, 1))

@@ -3,6 +3,7 @@
 from navfilters.papers.perea2007.experiment import (
     FILTERS,
     Setup,
+    deviations,
     improvement,
     isotropic,
     position_error,
@@ -11,6 +12,7 @@ from navfilters.papers.perea2007.experiment import (
 __all__ = [
     "FILTERS",
     "Setup",
+    "deviations",
     "improvement",
     "isotropic",
     "position_error",

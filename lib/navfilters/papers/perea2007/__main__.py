@@ -41,11 +41,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     needed("matplotlib", "navfilters[book]", "a picture of the maps")  # not only after all the work
     options = {"steps": chosen.steps, "engine": chosen.engine, "workers": None, "progress": True}
     found = {}
-    for name in FILTERS:
+    for name, estimator in FILTERS.items():
         for label, compute in (("starts", over_starts), ("noises", over_noises)):
             for changed in (False, True):
                 key = f"{label}{' changed' * changed}/{name}"
-                found[key] = compute(name, chosen.size, changed=changed, **options)
+                found[key] = compute(estimator, chosen.size, changed=changed, **options)
         sys.stdout.write(f"{name}: {np.mean(~(found[f'starts/{name}'] <= 0.1)):.1%} above 0.1\n")
     Path(chosen.out).parent.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(f"{chosen.out}.npz", **{k.replace("/", " "): v for k, v in found.items()})

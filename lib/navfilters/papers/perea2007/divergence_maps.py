@@ -5,7 +5,7 @@ from typing import Any, Literal
 import numpy as np
 
 from navfilters.models import RangeBearing
-from navfilters.papers.perea2007.experiment import FILTERS, Setup, isotropic, position_error
+from navfilters.papers.perea2007.experiment import Setup, isotropic, position_error
 from navfilters.runs.sweeping import sweep
 from navfilters.types import Array, Gaussian
 
@@ -81,12 +81,11 @@ def indicator(
     workers: int | None = 1,
     progress: bool = False,
 ) -> Array:
-    """I of one filter: the last error over the first.
+    """I of a filter: the last error over the first.
 
     Parameters
     ----------
-    estimator : Filter, or whatever ``sweep`` takes, or str
-        A str is a key of ``FILTERS``.
+    estimator : Filter, or whatever ``navfilters.sweep`` takes
     mean : array-like (..., 2)
         First estimate, units.
     sigma : array-like (...)
@@ -110,7 +109,7 @@ def indicator(
     shape = np.broadcast_shapes(mean.shape[:-1], np.shape(sigma))
     priors = isotropic(np.broadcast_to(mean, (*shape, 2)), np.broadcast_to(sigma, shape))
     end: Gaussian = sweep(
-        FILTERS[estimator] if isinstance(estimator, str) else estimator,
+        estimator,
         priors,
         setup.z,
         setup.model if R is None else RangeBearing(R, wrap=False),
@@ -127,7 +126,7 @@ def over_starts(estimator: Any, size: int, *, changed: bool = False, **options: 
 
     Parameters
     ----------
-    estimator : as of ``indicator``
+    estimator : Filter
     size : int
     changed : bool
         Whether the first estimates are changed in their last bit.
@@ -147,7 +146,7 @@ def over_noises(estimator: Any, size: int, *, changed: bool = False, **options: 
 
     Parameters
     ----------
-    estimator : as of ``indicator``
+    estimator : Filter
     size : int
     changed : bool
         Whether the first estimate is changed in its last bit.

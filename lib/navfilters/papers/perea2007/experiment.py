@@ -99,6 +99,25 @@ def position_error(x: Any, x_true: Any) -> Array:
     return np.linalg.norm(np.asarray(x) - np.asarray(x_true), axis=-1)
 
 
+def deviations(estimate: Gaussian, x_true: Any) -> Array:
+    """How many of an estimate's own deviations the truth is away from it.
+
+    Parameters
+    ----------
+    estimate : Gaussian
+        mean (..., n), cov (..., n, n).
+    x_true : array-like (..., n)
+
+    Returns
+    -------
+    array (...)
+        The Mahalanobis distance; of an indefinite covariance, the root of the square's size.
+    """
+    away = np.asarray(x_true) - estimate.mean
+    weighed = np.linalg.solve(estimate.cov, away[..., None])[..., 0]
+    return np.sqrt(np.abs((away * weighed).sum(axis=-1)))
+
+
 def improvement(history: Gaussian, x_true: Any) -> Array:
     """The indicator I: the last error over the first.
 
