@@ -68,7 +68,9 @@ def runs(count=200, steps=12):
 def test_run_sweep_and_consistency(name, engine):
     truth, prior, z = runs()
     wanted = run(NEW[name], prior, z, MODEL, z_per_step=True)
-    got = sweep(NEW[name], prior, z, MODEL, z_per_step=True, progress=False, engine=engine, chunk=64)
+    got = sweep(
+        NEW[name], prior, z, MODEL, z_per_step=True, progress=False, engine=engine, chunk=64
+    )
     assert_allclose(got.final.mean, wanted.mean[-1], rtol=1e-10)
     assert_allclose(got.final.cov, wanted.cov[-1], rtol=1e-8)
     each = nees(truth - got.final.mean, got.final.cov)
@@ -77,7 +79,7 @@ def test_run_sweep_and_consistency(name, engine):
 
 
 def test_a_rule_declares_its_linear_limit():
-    truth, prior, z = runs(200, 1)
+    _, prior, z = runs(200, 1)
     rule = NEW["a rule, each its own"]
     doubled = Gaussian(prior.mean, rule.rule.limit(np.eye(2)))
     got = rule.update(rule.init(prior), z[0], MODEL).estimate

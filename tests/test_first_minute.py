@@ -347,7 +347,9 @@ def test_every_module_is_imported_or_says_what_it_needs():
     ]
 
 
-@pytest.mark.parametrize("options", ["", "progress=True", "workers=1", "record=lambda state: state.estimate"])
+@pytest.mark.parametrize(
+    "options", ["", "progress=True", "workers=1", "record=lambda state: state.estimate"]
+)
 def test_a_sweep_needs_no_extra(options):
     done = bare(START + f"swept({options}); print('done')")
     assert (done.stdout, done.returncode) == ("done\n", 0), done.stderr

@@ -1,4 +1,4 @@
-"""Every filter that the stages compose is, on a linear model, the Kalman filter that they declare."""
+"""On a linear model whatever the stages compose is the Kalman filter that they declare."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -190,14 +190,22 @@ def test_a_variant_that_needs_a_jacobian_says_so(variant):
 @pytest.mark.parametrize(("m", "n"), [(1, 2), (2, 3), (3, 2)])
 def test_a_measurement_without_an_inverse_cannot_be_bumped_by_it(moments, m, n):
     model = Linear(np.ones((m, n)), np.eye(m))
-    prior, filter_ = Gaussian(np.zeros(n), np.eye(n)), Filter(MOMENTS[moments], variants.bump_equivalent)
+    prior, filter_ = (
+        Gaussian(np.zeros(n), np.eye(n)),
+        Filter(MOMENTS[moments], variants.bump_equivalent),
+    )
     message = f"as many components as the state has; found {m} measurements of {n} states"
-    for go in (lambda: filter_(prior, np.zeros(m), model), lambda: run(filter_, prior, np.zeros(m), model, 1)):
+    for go in (
+        lambda: filter_(prior, np.zeros(m), model),
+        lambda: run(filter_, prior, np.zeros(m), model, 1),
+    ):
         with pytest.raises(ValueError, match=message):
             go()
 
 
-@pytest.mark.parametrize("rule", [Robust(9.0), AdaptiveRobust(), AdaptiveNoise(directions=np.eye(3))])
+@pytest.mark.parametrize(
+    "rule", [Robust(9.0), AdaptiveRobust(), AdaptiveNoise(directions=np.eye(3))]
+)
 def test_a_filter_with_a_rule_is_not_called(rule):
     prior, z, model, _ = problem(Linear)
     with pytest.raises(TypeError, match=f"has a memory: use run.*found {type(rule).__name__}"):

@@ -13,7 +13,16 @@ from hypothesis import strategies as st
 from naive import covariances, each, quadratic
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters import FILTERS, Filter, Gaussian, Moments, SigmaPoints, kalman_update, linearized, run
+from navfilters import (
+    FILTERS,
+    Filter,
+    Gaussian,
+    Moments,
+    SigmaPoints,
+    kalman_update,
+    linearized,
+    run,
+)
 from navfilters.estimators.filter import _keywords
 from navfilters.estimators.variants import (
     bump_circular,
@@ -187,7 +196,7 @@ def test_the_update_is_the_plain_loop():
 
 
 def test_both_forms_are_one_covariance():
-    """To rounding, scaled by the condition of the innovation's covariance; the mean, bit for bit."""
+    """To rounding, scaled by the condition of P_zz; the mean, bit for bit."""
     rng = np.random.default_rng(3)
     for n, m, vague in product([1, 2, 3, 5], [1, 2, 3, 5], [1.0, 1e6]):
         prior = Gaussian(rng.normal(size=(4, n)), vague * covariances(rng, (4,), n))

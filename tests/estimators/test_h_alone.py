@@ -39,7 +39,9 @@ def problem(count=5):
 @pytest.mark.parametrize("name", FILTERS)
 def test_it_is_the_model_with_its_derivatives(name, model):
     prior, z = problem()
-    got, wanted = (run(FILTERS[name], prior, z, m, 5) for m in (model, RangeBearing(POLAR.R, False)))
+    got, wanted = (
+        run(FILTERS[name], prior, z, m, 5) for m in (model, RangeBearing(POLAR.R, False))
+    )
     assert_allclose(got.mean, wanted.mean, rtol=1e-8)
     assert_allclose(got.cov, wanted.cov, rtol=0, atol=1e-8 * np.abs(wanted.cov).max())
     if name in {"UKF", "B-UKF", "UKFz"}:
@@ -76,7 +78,9 @@ def test_an_h_that_is_not_analytic_is_refused_where_its_derivative_is_needed(nam
     model = SimpleNamespace(R=POLAR.R, h=ROUGH[rough])
     if name in {"UKF", "B-UKF", "UKFz"}:
         assert np.isfinite(run(FILTERS[name], prior, z, model, 2).mean).all()
-        assert np.isfinite(sweep(FILTERS[name], prior, z, model, 2, progress=False).final.mean).all()
+        assert np.isfinite(
+            sweep(FILTERS[name], prior, z, model, 2, progress=False).final.mean
+        ).all()
         return
     message = r"model\.h must .*Give its Jacobian instead"
     with pytest.raises(TypeError, match=message):

@@ -30,9 +30,7 @@ def at_angle(degrees, r=80.0):
 def test_a_target_behind_the_sensor_is_found(name, engine):
     """Truth one degree below, estimate one degree above the negative axis, 2.79 away."""
     truth, prior = at_angle(-179), Gaussian(at_angle(179), 9 * np.eye(2))
-    got = sweep(
-        FILTERS[name], prior, POLAR.h(truth), POLAR, 1, engine=engine, progress=False
-    ).final
+    got = sweep(FILTERS[name], prior, POLAR.h(truth), POLAR, 1, engine=engine, progress=False).final
     assert np.linalg.norm(got.mean - truth) < 2.8
     plain = RangeBearing(POLAR.R, wrap=False)
     far = run(FILTERS[name], prior, POLAR.h(truth), plain, 1).mean[-1]
@@ -147,7 +145,9 @@ def flight(sigma, steps=6, count=4):
 def test_the_jacobian_is_that_of_the_retraction():
     _, _, sensor, motion, truth = flight(0.1)
     q, small = truth[0], 1e-6 * np.eye(3)
-    moved = [(sensor.h(sensor.retract(q, d)) - sensor.h(sensor.retract(q, -d))) / 2e-6 for d in small]
+    moved = [
+        (sensor.h(sensor.retract(q, d)) - sensor.h(sensor.retract(q, -d))) / 2e-6 for d in small
+    ]
     assert_allclose(np.stack(moved, -1), sensor.jacobian(q), atol=1e-9)
     turned = [sensor.difference(motion.f(sensor.retract(q, d)), motion.f(q)) for d in small]
     assert_allclose(np.stack(turned, -1) * 1e6, motion.transition(q)[1], atol=1e-6)
@@ -176,8 +176,10 @@ def test_in_small_errors_ekf_and_ukf_agree():
     """Ten times smaller errors, a hundred times closer: to second order."""
     apart = []
     for sigma in (1e-2, 1e-3):
-        prior, z, sensor, motion, _ = flight(sigma)
-        z = sensor.h(prior.mean)[None] + sigma * 0.1 * np.random.default_rng(2).normal(size=(1, 4, 6))
+        prior, z, sensor, _, _ = flight(sigma)
+        z = sensor.h(prior.mean)[None] + sigma * 0.1 * np.random.default_rng(2).normal(
+            size=(1, 4, 6)
+        )
         a, b = (run(FILTERS[n], prior, z, sensor, z_per_step=True).mean[-1] for n in ("EKF", "UKF"))
         apart.append(np.abs(sensor.difference(a, b)).max() / sigma)
     assert apart[0] < 1e-2
@@ -185,7 +187,7 @@ def test_in_small_errors_ekf_and_ukf_agree():
 
 
 def test_a_prior_that_does_not_fit_the_manifold_is_refused():
-    prior, z, sensor, motion, _ = flight(0.1)
+    prior, z, sensor, _, _ = flight(0.1)
     for cov in (np.eye(4), np.eye(2), np.ones(3)):
         for go in (run, sweep):
             with pytest.raises(ValueError, match=r"priors?(\.cov)? must"):

@@ -1,4 +1,4 @@
-"""Predictions: against the textbook, the exact moments of a quadratic, and derivatives not given."""
+"""Predictions: the textbook's, exact moments of a quadratic, and derivatives not given."""
 
 from dataclasses import dataclass
 
@@ -61,7 +61,9 @@ def test_linearised_is_the_textbooks():
     for i, (x, P) in enumerate(zip(*prior, strict=True)):
         F = motion.F + motion.A @ x
         assert_allclose(got.mean[i], motion.F @ x + x @ motion.A @ x / 2, rtol=1e-12)
-        assert_allclose(got.cov[i], F @ P @ F.T + motion.Q, rtol=0, atol=1e-12 * np.abs(P).max() * 9)
+        assert_allclose(
+            got.cov[i], F @ P @ F.T + motion.Q, rtol=0, atol=1e-12 * np.abs(P).max() * 9
+        )
     assert_array_equal(got.cov, got.cov.mT)
 
 

@@ -26,9 +26,7 @@ class Swing:
 WITH_MEMORY = {
     "EKF": Filter(),
     "REKF": Filter(rule=Robust(np.linspace(2.0, 9.0, 6))),
-    "AEKF": Filter(
-        rule=AdaptiveNoise(np.linspace(0.1, 0.5, 6), N=4, directions=np.eye(3)[:, :2])
-    ),
+    "AEKF": Filter(rule=AdaptiveNoise(np.linspace(0.1, 0.5, 6), N=4, directions=np.eye(3)[:, :2])),
     "AREKF": Filter(rule=AdaptiveRobust(np.linspace(0.1, 0.9, 6))),
 }
 

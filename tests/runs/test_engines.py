@@ -109,9 +109,7 @@ def test_everything_kept_agrees():
 
 @pytest.mark.parametrize("steps", [0, 1, 2])
 def test_few_steps(steps):
-    kept = partial(
-        quiet, FILTERS["EKF"], priors(3), BASE.z, MODEL, steps, record=records.estimate
-    )
+    kept = partial(quiet, FILTERS["EKF"], priors(3), BASE.z, MODEL, steps, record=records.estimate)
     got, wanted = kept(engine="jax"), kept()
     assert got.record.mean.shape == (steps + 1, 3, 2)
     for ours, theirs in zip(

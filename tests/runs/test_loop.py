@@ -375,7 +375,12 @@ REFUSED = {
     "z: a number": ({"z": 1.0}, "z", r"\(\)", r"\.\.\., m"),
     "z: three components": ({"z": [1.0, 2.0, 3.0]}, "z", r"\(3,\)", "m = 2 as in model.R"),
     "z: one component": ({"z": np.ones((2, 1))}, "z", r"\(2, 1\)", "m = 2 as in model.R"),
-    "z: infinite": ({"z": [[1.0, 2.0], [np.inf, 0]]}, "z", r"inf at index \(1, 0\)", "NaN where it was not"),
+    "z: infinite": (
+        {"z": [[1.0, 2.0], [np.inf, 0]]},
+        "z",
+        r"inf at index \(1, 0\)",
+        "NaN where it was not",
+    ),
     "z: complex": ({"z": [1.0, 1j]}, "z", "complex128", "real numbers"),
     "z: strings": ({"z": ["1.0", "2.0"]}, "z", "<U3", "real numbers"),
     "z: ragged": ({"z": [[1.0, 2.0], [3.0]]}, "z", "list", "real numbers"),

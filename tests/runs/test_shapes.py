@@ -100,8 +100,14 @@ MOTION = {
     "Q: deviations": (Moving(np.array([0.1, 0.2])), "Q must"),
     "Q: a number": (Moving(0.1), "Q must"),
     "Q: of three": (Moving(np.eye(3)), "Q must"),
-    "f: one component": (Moving(GOOD_Q, lambda x: x[..., :1]), "(f.x. of .*transition|dynamics.f) must"),
-    "f: a number": (Moving(GOOD_Q, lambda x: np.float64(1.0)), "(f.x. of .*transition|dynamics.f) must"),
+    "f: one component": (
+        Moving(GOOD_Q, lambda x: x[..., :1]),
+        "(f.x. of .*transition|dynamics.f) must",
+    ),
+    "f: a number": (
+        Moving(GOOD_Q, lambda x: np.float64(1.0)),
+        "(f.x. of .*transition|dynamics.f) must",
+    ),
     "F: a row": (Moving(GOOD_Q, F=lambda x: np.ones((1, 2))), "F of .*transition must"),
     "F: a number": (Moving(GOOD_Q, F=lambda x: np.float64(1.0)), "F of .*transition must"),
     "F: a vector": (Moving(GOOD_Q, F=lambda x: np.ones(2)), "F of .*transition must"),

@@ -8,7 +8,7 @@ import naive
 import numpy as np
 import pytest
 from naive import covariances
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from navfilters import FILTERS, Filter, Gaussian, SweepError, run, sweep
 from navfilters.estimators.multiplicative import MekfState, mekf_update
@@ -117,7 +117,7 @@ def test_a_sensor_may_be_another_at_each_step(name, engine):
         P = F @ P @ F.T + dynamics.Q
         H, R = sensor.H[k], sensor.R / (1 + k)
         noise = R + H @ P @ H.T * (name == "B-EKF 1")
-        each = [naive.kalman(*m, H, R_i) for *m, R_i in zip(x, P, z[k], noise + 0 * P[:, :1, :1])]
+        each = [naive.kalman(*m, H, R_i) for *m, R_i in zip(x, P, z[k], noise + 0 * P[:, :1, :1], strict=True)]
         x, P = map(np.stack, zip(*each, strict=True))
         assert_allclose(got.record.mean[k + 1], x, rtol=0, atol=1e-11 * np.abs(x).max())
         assert_allclose(got.record.cov[k + 1], P, rtol=0, atol=1e-11 * np.abs(P).max())

@@ -76,7 +76,9 @@ def test_a_cluster_gives_the_same(client, engine):
 def test_long_series_of_measurements_are_sent(client):
     """More than dask likes to send with a task: no warning."""
     z = np.broadcast_to(BASE.z, (400, 2000, 2))
-    go = partial(quiet, lambda prior, z, model: prior, priors(2000), z=z, steps=400, z_per_step=True)
+    go = partial(
+        quiet, lambda prior, z, model: prior, priors(2000), z=z, steps=400, z_per_step=True
+    )
     assert_same(go(chunk=2000, client=client).final, go().final)
 
 

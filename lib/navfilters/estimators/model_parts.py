@@ -78,7 +78,7 @@ def difference(model: Any, x: Array, y: Array) -> Array:
     return model.difference(x, y) if hasattr(model, "difference") else x - y
 
 
-def moved(dynamics: Dynamics, x: Array) -> Array:
+def moved(dynamics: Any, x: Array) -> Array:
     """f(x), without its Jacobian where that costs extra."""
     if hasattr(dynamics, "f"):
         return dynamics.f(x)
