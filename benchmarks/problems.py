@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from navfilters import Gaussian, sweep
-from navfilters.estimators.extended import ExtendedKalman
+from navfilters import Filter, Gaussian, sweep
 from navfilters.estimators.multiplicative import MekfState, mekf_update
 from navfilters.numerics.runge_kutta import runge_kutta
 from navfilters.papers import pogorelsky2020, xiong2009
@@ -93,8 +92,7 @@ class Coasting:
 
     def ours(self, prior: Gaussian, z: Array, steps: int, engine: str) -> Gaussian:
         """This library, through its public function, checks of the input included."""
-        model = self, self.sensor
-        return swept(ExtendedKalman(), prior, z, model, steps, engine).estimate
+        return swept(Filter(), prior, z, self.sensor, steps, engine, dynamics=self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,9 +233,10 @@ class Multiplicative:
         return Navigation(*mekf_update(state, image, images.geometry).state)
 
 
-def swept(estimator, prior, z, model, steps, engine):
-    """The last state of a sweep on one core."""
-    options = {"engine": engine, "z_per_step": True, "workers": 1, "progress": False}
+def swept(estimator, prior, z, model, steps, engine, dynamics):
+    """The last estimate of a sweep on one core."""
+    options = {"engine": engine, "dynamics": dynamics, "z_per_step": True, "workers": 1}
+    options["progress"] = False
     return sweep(estimator, prior, z[:steps], model, steps, **options).final
 
 
