@@ -182,6 +182,11 @@ def wrong():
             ValueError,
             "model must have R, and h.*found Silent",
         ),
+        "a sensor without h, in a sweep": (
+            lambda: sweep(ekf, prior, z[0], Silent(), 2),
+            ValueError,
+            "model must have R, and h.*found Silent",
+        ),
         "an unknown option": (
             lambda: run(partial(ekf, bumps=1.0), prior, z[0], sensor, 2),
             TypeError,

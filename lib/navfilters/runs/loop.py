@@ -89,6 +89,7 @@ def run(
         )
     model_checks.models(model, dynamics, prior)
     if steps and isinstance(estimator, Filter):
+        model_checks.measures(model)
         derivative_checks.derivatives(estimator, prior, model, dynamics)
     if record is not records.estimate and not callable(record):
         raise TypeError(f"record must be callable as record(state); found {record!r}")
