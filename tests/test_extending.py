@@ -79,7 +79,7 @@ def test_run_sweep_and_consistency(name, engine):
 
 
 def test_a_rule_declares_its_linear_limit():
-    truth, prior, z = runs(200, 1)
+    _, prior, z = runs(200, 1)
     rule = NEW["a rule, each its own"]
     doubled = Gaussian(prior.mean, rule.rule.limit(np.eye(2)))
     got = rule.update(rule.init(prior), z[0], MODEL).estimate

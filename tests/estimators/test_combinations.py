@@ -1,4 +1,4 @@
-"""Every filter that the stages compose is, on a linear model, the Kalman filter that they declare."""
+"""On a linear model whatever the stages compose is the Kalman filter that they declare."""
 
 from dataclasses import dataclass, replace
 from functools import partial

@@ -196,7 +196,7 @@ def test_the_update_is_the_plain_loop():
 
 
 def test_both_forms_are_one_covariance():
-    """To rounding, scaled by the condition of the innovation's covariance; the mean, bit for bit."""
+    """To rounding, scaled by the condition of P_zz; the mean, bit for bit."""
     rng = np.random.default_rng(3)
     for n, m, vague in product([1, 2, 3, 5], [1, 2, 3, 5], [1.0, 1e6]):
         prior = Gaussian(rng.normal(size=(4, n)), vague * covariances(rng, (4,), n))

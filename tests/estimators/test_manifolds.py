@@ -111,13 +111,14 @@ class Turning(Directions):
     """The body turns by the same rotation at each step; R is not used."""
 
     Q: np.ndarray = None
-    rate: np.ndarray = None
+    rate: tuple = ()
 
     def f(self, q):
-        return product(from_rotation_vector(self.rate), q)
+        xp = q.__array_namespace__()
+        return product(from_rotation_vector(xp.asarray(self.rate)), q)
 
     def transition(self, q):
-        return self.f(q), rotation(self.rate)
+        return self.f(q), q.__array_namespace__().asarray(rotation(np.array(self.rate)))
 
 
 def rotation(v):
@@ -132,7 +133,7 @@ def flight(sigma, steps=6, count=4):
     rng = np.random.default_rng(1)
     known = np.array([[1.0, 0.0, 0.0], [0.0, 0.6, 0.8]])
     sensor = Directions(1e-6 * np.eye(6), known)
-    motion = Turning(sensor.R, known, 1e-8 * np.eye(3), np.array([0.3, -0.1, 0.2]))
+    motion = Turning(sensor.R, known, 1e-8 * np.eye(3), (0.3, -0.1, 0.2))
     truth = [normalized(rng.normal(size=4))]
     for _ in range(steps):
         truth.append(motion.f(truth[-1]))
@@ -176,7 +177,7 @@ def test_in_small_errors_ekf_and_ukf_agree():
     """Ten times smaller errors, a hundred times closer: to second order."""
     apart = []
     for sigma in (1e-2, 1e-3):
-        prior, z, sensor, motion, _ = flight(sigma)
+        prior, z, sensor, _, _ = flight(sigma)
         z = sensor.h(prior.mean)[None] + sigma * 0.1 * np.random.default_rng(2).normal(
             size=(1, 4, 6)
         )
@@ -187,7 +188,7 @@ def test_in_small_errors_ekf_and_ukf_agree():
 
 
 def test_a_prior_that_does_not_fit_the_manifold_is_refused():
-    prior, z, sensor, motion, _ = flight(0.1)
+    prior, z, sensor, _, _ = flight(0.1)
     for cov in (np.eye(4), np.eye(2), np.ones(3)):
         for go in (run, sweep):
             with pytest.raises(ValueError, match=r"priors?(\.cov)? must"):

@@ -1,4 +1,4 @@
-"""NaN in z means "not measured": by component, by member, on both engines; and what a state says."""
+"""NaN in z means "not measured", by component and by member; and what a state says."""
 
 from dataclasses import dataclass
 from functools import partial

@@ -1,4 +1,4 @@
-"""Predictions: against the textbook, the exact moments of a quadratic, and derivatives not given."""
+"""Predictions: the textbook's, exact moments of a quadratic, and derivatives not given."""
 
 from dataclasses import dataclass
 

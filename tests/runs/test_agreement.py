@@ -45,7 +45,7 @@ def test_run_and_sweep_agree(name, driven, engine):
     """To the last bit on the host; a tuple of tuples, and None that becomes an array."""
     if engine == "jax" and name not in {"UKF", "mtSOF", "EKF, adaptive robust", "EKF, adaptive"}:
         pytest.skip("compiles the same parts")
-    prior, z, sensor, dynamics, steps = moving()
+    prior, z, sensor, dynamics, _ = moving()
     z[4, 2], z[3, 1, 0] = np.nan, np.nan
     dynamics = dynamics if driven else None
     go = {"dynamics": dynamics, "z_per_step": True, "record": everything}
@@ -179,6 +179,11 @@ def wrong():
         ),
         "a sensor without h": (
             lambda: run(ekf, prior, z[0], Silent(), 2),
+            ValueError,
+            "model must have R, and h.*found Silent",
+        ),
+        "a sensor without h, in a sweep": (
+            lambda: sweep(ekf, prior, z[0], Silent(), 2),
             ValueError,
             "model must have R, and h.*found Silent",
         ),

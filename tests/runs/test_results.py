@@ -88,7 +88,7 @@ def rounded(prior, z, model):
 
 @pytest.mark.parametrize("estimator", [averages, shortened, widened, rounded])
 def test_a_chunk_of_another_shape_or_type_is_no_result(estimator):
-    message = r"chunk 0, configurations 0 to 6: estimator must return arrays .*; found state.estimate.mean"
+    message = r"chunk 0, configurations 0 to 6: estimator must return arrays .*; found state.est"
     with pytest.raises(SweepError, match=message):
         quiet(estimator, priors(), chunk=7)
 

@@ -112,7 +112,9 @@ def test_a_sensor_may_be_another_at_each_step(name, engine):
         P = F @ P @ F.T + dynamics.Q
         H, R = sensor.H[k], sensor.R / (1 + k)
         noise = R + H @ P @ H.T * (name == "B-EKF 1")
-        each = [naive.kalman(*m, H, R_i) for *m, R_i in zip(x, P, z[k], noise + 0 * P[:, :1, :1])]
+        noise = np.broadcast_to(noise, (len(x), 1, 1))
+        members = zip(x, P, z[k], noise, strict=True)
+        each = [naive.kalman(*member, H, R_i) for *member, R_i in members]
         x, P = map(np.stack, zip(*each, strict=True))
         assert_allclose(got.record.mean[k + 1], x, rtol=0, atol=1e-11 * np.abs(x).max())
         assert_allclose(got.record.cov[k + 1], P, rtol=0, atol=1e-11 * np.abs(P).max())

@@ -88,7 +88,8 @@ def run(
             f"found {type(estimator).__name__}"
         )
     model_checks.models(model, dynamics, prior, steps)
-    if steps:
+    if steps and isinstance(estimator, Filter):
+        model_checks.measures(model)
         compare_derivatives(estimator, model, dynamics, prior)
     if record is not records.estimate and not callable(record):
         raise TypeError(f"record must be callable as record(state); found {record!r}")

@@ -65,6 +65,13 @@ def start(name: str, prior: Any, model: Any, dynamics: Any) -> Gaussian:
     return Gaussian(mean, cov)
 
 
+def measures(model: Any) -> None:
+    """ValueError for a model without h, which a filter of ours needs."""
+    first = at(model, 0)
+    if not (hasattr(first, "h") or hasattr(first, "given")):
+        raise ValueError(f"model must have R, and h; found {type(model).__name__}")
+
+
 def measurements(
     z: Any,
     prior: Gaussian,
@@ -113,9 +120,8 @@ def measurements(
         "z": z.shape[1:-1] if z_per_step else z.shape[:-1],
     }
     first = at(model, 0)
-    if not hasattr(model, "R") or not (hasattr(first, "h") or hasattr(first, "given")):
-        found = type(model).__name__
-        raise ValueError(f"model must have R, and h with its derivatives; found {found}")
+    if not hasattr(model, "R"):
+        raise ValueError(f"model must have R, and h; found {type(model).__name__}")
     R = validation.covariance("model.R", model.R, definite=False)
     shapes["model.R"] = R.shape[:-2]
     if not hasattr(first, "given"):

@@ -13,6 +13,7 @@ from typing import Any, Literal
 from uuid import uuid4
 
 from navfilters.estimators.any_filter import as_filter
+from navfilters.estimators.filter import Filter
 from navfilters.numerics import validation
 from navfilters.numerics.extras import needed
 from navfilters.runs import model_checks
@@ -157,6 +158,8 @@ def sweep(
         for name, value in (("workers", workers), ("chunk", chunk))
     )
     problem = Problem.of(estimator, priors, z, model, dynamics, record, steps, z_per_step)
+    if steps and isinstance(estimator, Filter):
+        model_checks.measures(model)
     complete = problem.complete and not hasattr(model_checks.at(model, 0), "given")
     shared = problem.tree, problem.axes, problem.grid, steps, z_per_step, complete
     job = Job(engine, *shared, uuid4().hex)
