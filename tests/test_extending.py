@@ -98,11 +98,3 @@ def test_a_divergence_map(new, engine):
     alone = indicator(new, starts(6)[2, 3], steps=30, engine=engine)
     assert_allclose(alone, I[2, 3], rtol=1e-6)
     assert over_noises(new, 4, steps=5, engine=engine).shape == (4, 4)
-
-
-def test_a_name_is_short_for_one_of_the_papers_filters():
-    from navfilters.papers.perea2007.experiment import FILTERS as PAPER
-
-    for change in (False, True):
-        got, wanted = (over_starts(f, 5, changed=change, steps=9) for f in ("EKF", PAPER["EKF"]))
-        assert_array_equal(got, wanted)

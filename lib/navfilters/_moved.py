@@ -33,7 +33,7 @@ MOVED = {
     "models.sar_geometry": "space",
     "models.star_earth_sensor": "space",
     "moments": "estimators.moments, estimators.sigma_points",
-    "multiplicative": "estimators.multiplicative",
+    "multiplicative": "estimators.variants, space",
     "plotting": "book.plotting",
     "probing": "numerics.probing",
     "robust": "estimators.filter, estimators.robust, estimators.adaptive",
@@ -49,6 +49,14 @@ MOVED = {
 """Old module to new ones, under ``navfilters``."""
 
 GONE = {
+    "multiplicative": (
+        "mekf_update(state, z, model, underweighting=b) is an update of "
+        "Filter(variant=Underweighting(b)) on a SarGeometry"
+    ),
+    "robust": (
+        "RobustEKF(gamma) is Filter(rule=Robust(gamma)), AdaptiveRobustEKF() is "
+        'Filter(rule=AdaptiveRobust()), ExtendedKalman() is FILTERS["EKF"]'
+    ),
     "discrete": (
         'extended_kalman_filter(system, prior, y, u) is run(FILTERS["EKF"], prior, y, '
         "system.sensor, dynamics=system.dynamics(u), z_per_step=True)"

@@ -23,19 +23,6 @@ LOCAL = re.compile(
     r"(?<!\w)/(home|Users|root|tmp|work|opt)/\w|\b[A-Z]:\\|\bat 0x[0-9a-f]+|\d{4}-\d\d-\d\dT\d\d:"
 )
 
-# What chapters owe until they are next rewritten. Nothing may be added to any of the three.
-LONG = {"orbit-manoeuvre/robust-filters"}
-TWICE = {"departure", "deviations", "digits", "flown", "squared_deviations", "sweep"}
-SHADOWED = {
-    ("foundations/extended-kalman-filter", "run"),
-    ("orbit-manoeuvre/limits", "noise"),
-    ("orbit-manoeuvre/robust-filters", "truth"),
-    ("orbit-manoeuvre/robust-filters", "unscented"),
-    ("range-bearing/close-estimates", "sweep"),
-    ("range-bearing/sensitivity", "sweep"),
-}
-MODULES = {"navfilters.estimators", "navfilters.numerics"}  # whose packages export nothing yet
-
 
 def label(path):
     return path.relative_to(ROOT / "book").with_suffix("").as_posix()
@@ -150,7 +137,7 @@ def imported(path):
 @every_notebook
 def test_it_has_few_cells_that_show_something(path):
     shown = [cell for cell in code_cells(path) if cell.outputs]
-    assert len(shown) <= 24 or label(path) in LONG
+    assert len(shown) <= 24
 
 
 def test_no_function_is_defined_in_two_chapters():
@@ -159,7 +146,7 @@ def test_no_function_is_defined_in_two_chapters():
         for node in (node for tree in syntax(path) for node in tree.body):
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 where[node.name].add(label(path))
-    assert {name for name, pages in where.items() if len(pages) > 1} <= TWICE
+    assert {name for name, pages in where.items() if len(pages) > 1} == set()
 
 
 @every_notebook
@@ -169,7 +156,7 @@ def test_it_binds_no_name_of_the_library(path):
     for module, _ in imported(path):
         if module != "navfilters.book":  # plotting and claims, which keep their names to themselves
             taken |= set(getattr(importlib.import_module(module), "__all__", ()))
-    assert {(label(path), name) for name in bound(path) if name in taken} <= SHADOWED
+    assert {(label(path), name) for name in bound(path) if name in taken} == set()
 
 
 @every_notebook
@@ -177,4 +164,4 @@ def test_it_imports_from_packages_only(path):
     """A page shows the public names and not where they are kept."""
     for module, names in imported(path):
         package = hasattr(importlib.import_module(module), "__path__")
-        assert package or module.rpartition(".")[0] in MODULES, (module, names)
+        assert package, (module, names)

@@ -8,7 +8,7 @@ import pytest
 from naive import covariances
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters import FILTERS, Gaussian, SweepError, run, sweep
+from navfilters import FILTERS, Gaussian, run, sweep
 from navfilters.models import RangeBearing
 
 engines = pytest.mark.parametrize("engine", ["numpy", pytest.param("jax", marks=pytest.mark.slow)])
@@ -85,5 +85,5 @@ def test_an_h_that_is_not_analytic_is_refused_where_its_derivative_is_needed(nam
     message = r"model\.h must .*Give its Jacobian instead"
     with pytest.raises(TypeError, match=message):
         run(FILTERS[name], prior, z, model, 2)
-    with pytest.raises(SweepError, match=f"configuration 0: TypeError: {message}"):
+    with pytest.raises(TypeError, match=message):
         sweep(FILTERS[name], prior, z, model, 2, progress=False)

@@ -143,9 +143,9 @@ def test_members_are_compared_to_a_part_in_a_million():
 
 
 def test_an_empty_batch_is_looked_at_with_ones():
-    empty = np.ones((0, 2))
+    empty = Gaussian(np.ones((0, 2)), np.eye(2))
     sensor(RIGHT, empty)
     still = SimpleNamespace(Q=np.eye(2), transition=lambda x: (x, np.eye(2)))
-    dynamics(still, empty, name="model")
+    dynamics(still, empty)
     with pytest.raises(ValueError, match=r"model.h must"):
         sensor(Model(h=lambda x: x[..., :1]), empty)

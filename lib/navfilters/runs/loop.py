@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from navfilters.estimators.any_filter import as_filter
+from navfilters.estimators.filter import Filter
 from navfilters.numerics import validation
 from navfilters.numerics.allocator import keep_freed_memory
 from navfilters.numerics.small_matrices import is_positive_definite

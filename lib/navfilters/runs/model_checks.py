@@ -170,16 +170,14 @@ def models(model: Any, motion: Any, prior: Gaussian, steps: int, name: str = "pr
     ValueError
         As of :func:`sensor` and :func:`dynamics`; or as a model's own ``check`` has it.
     """
-    for part in (model, motion):
-        first = None if part is None else at(part, 0)
-        if first is None or hasattr(first, "given"):
-            continue
-        if hasattr(first, "check"):
-            first.check(prior, steps)
-        elif part is model:
-            sensor(first, prior, name=name)
-        else:
-            dynamics(first, prior)
+    first = at(model, 0)
+    if hasattr(first, "check"):
+        first.check(prior, steps)
+    elif not hasattr(first, "given"):
+        sensor(first, prior, name=name)
+    if motion is not None:
+        moving = at(motion, 0)
+        moving.check(prior, steps) if hasattr(moving, "check") else dynamics(moving, prior)
 
 
 def sensor(model: MeasurementModel, prior: Gaussian, *, name: str = "prior") -> None:
