@@ -33,7 +33,7 @@ MOVED = {
     "models.sar_geometry": "space",
     "models.star_earth_sensor": "space",
     "moments": "estimators.moments, estimators.sigma_points",
-    "multiplicative": "estimators.multiplicative",
+    "multiplicative": "space.pose, estimators.variants",
     "plotting": "book.plotting",
     "probing": "numerics.probing",
     "robust": "estimators.extended, estimators.robust, estimators.adaptive",
