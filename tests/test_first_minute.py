@@ -341,6 +341,8 @@ def test_every_module_is_imported_or_says_what_it_needs():
     assert done.stdout.splitlines() == [
         "navfilters.book.plotting | plotting needs matplotlib: pip install navfilters[book]",
         "navfilters.oracles.perea2007 | this oracle needs mpmath: pip install navfilters[book]",
+        "navfilters.oracles.sar_second_order | this oracle needs mpmath: pip install "
+        "navfilters[book]",
         "navfilters.oracles.sar_trn | this oracle needs mpmath: pip install navfilters[book]",
         "navfilters.oracles.two_by_two | this oracle needs mpmath: pip install navfilters[book]",
         'navfilters.runs.compiled | engine="jax" needs JAX: pip install navfilters[jax]',

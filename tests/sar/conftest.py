@@ -2,12 +2,16 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from navfilters.papers.pogorelsky2020.acquisition import acquire
 from navfilters.papers.pogorelsky2020.experiment import NOMINAL, Setup
 from navfilters.papers.pogorelsky2020.imaging import Imaging
 from navfilters.papers.pogorelsky2020.true_flight import truth
+from navfilters.sar.ground.land_cover import LandCover
+from navfilters.sar.ground.scene import Points, Scene
+from navfilters.sar.ground.terrain import LocalMap, sample_terrain
 from navfilters.sar.raw.flight import Flight
 from navfilters.sar.raw.radar import Radar
 from navfilters.space.frames import ellipsoid_intersection
@@ -46,3 +50,17 @@ def imaging(small):
 def acquired(setup, imaging):
     """The first image of the closed loop, a tenth of its size."""
     return acquire(setup, 1, imaging)
+
+
+@pytest.fixture(scope="module")
+def tile():
+    """Posts about a place near Houston."""
+    return sample_terrain(30.0, -95.0)
+
+
+@pytest.fixture(scope="module")
+def scene(tile):
+    """The scene there, of which nothing but the heights is used."""
+    none = np.zeros(0)
+    cover = LandCover(np.ones((1, 1)), 1.0)
+    return Scene(LocalMap(30.0, -95.0), tile, cover, Points(none, none, none))

@@ -220,6 +220,7 @@ def test_parts_and_whole_of_a_measurement_and_of_a_state(batch):
     assert (seen.slant_range.shape, state.q_mu.shape) == (batch, (*batch, 4))
     assert_array_equal(seen.z, z)
     assert_array_equal(state.x, x)
+    assert_array_equal(Measurement(R0, 8e5, 7500.0).z, [*R0, 8e5, 7500])
     one = NavigationState(R0, V0, state.q_mu)  # of which all members share a part
     assert_array_equal(one.x[..., :3], np.broadcast_to(R0, (*batch, 3)))
 

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from geopotential import J2, MU, RE, potential
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
@@ -15,7 +16,6 @@ from navfilters.space.inertial_orbit import Orbit
 from navfilters.space.osculating_ellipse import perigee_apogee
 from navfilters.space.thrust import COASTING, Thrust
 
-MU, RE, J2 = 3.986004418e14, 6378137.0, 1.08262668e-3
 SCALE = np.array([1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3])  # m and m/s of similar weight in an orbit
 BURN = Thrust(0.45, ((30, 70),))
 Q = np.diag([4e-4, 4e-4, 4e-4, 4e-8, 1e-8, 9e-8])
@@ -54,14 +54,6 @@ def test_acceleration_is_equation_36_row_by_row():
             -MU * z / r**3 * (1 + k * (3 - tilt)),
         ]
         assert_allclose(EARTH.acceleration(np.array([x, y, z])), wanted, rtol=1e-14)
-
-
-def potential(r):
-    """mu/r (1 - J2 (Re/r)^2 P2(sin latitude)), P2(s) = (3 s^2 - 1) / 2."""
-    xp = r.__array_namespace__()
-    d = xp.sqrt(xp.sum(r * r, axis=-1))
-    legendre = (3 * (r[..., 2] / d) ** 2 - 1) / 2
-    return MU / d * (1 - J2 * (RE / d) ** 2 * legendre)
 
 
 def test_acceleration_is_the_gradient_of_the_potential_with_the_second_zonal_harmonic():

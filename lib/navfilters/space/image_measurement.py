@@ -49,7 +49,8 @@ class Measurement(NamedTuple):
     def z(self) -> Array:
         """All of it, (..., 5)."""
         xp = self.r_f.__array_namespace__()
-        return xp.concat([self.r_f, self.slant_range[..., None], self.speed[..., None]], axis=-1)
+        numbers = (xp.asarray(number)[..., None] for number in (self.slant_range, self.speed))
+        return xp.concat([self.r_f, *numbers], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)

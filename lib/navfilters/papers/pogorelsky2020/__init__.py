@@ -21,7 +21,6 @@ from navfilters.papers.pogorelsky2020.closed_loop import (
 from navfilters.papers.pogorelsky2020.experiment import (
     CASES,
     NOMINAL,
-    NOT_NEGATIVE,
     PAPER,
     Setup,
     of_case,
@@ -42,7 +41,6 @@ from navfilters.papers.pogorelsky2020.imaging import (
 )
 from navfilters.papers.pogorelsky2020.linearised import (
     Altered,
-    FixedModel,
     Leg,
     Seen,
     linearised_flight,
@@ -81,7 +79,6 @@ __all__ = [
     "MARGIN",
     "MISSING",
     "NOMINAL",
-    "NOT_NEGATIVE",
     "OF_THE_FILTER",
     "PAPER",
     "UPDATES",
@@ -90,7 +87,6 @@ __all__ = [
     "Altered",
     "Attempt",
     "Campaign",
-    "FixedModel",
     "Folder",
     "Formed",
     "ImageTable",
