@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from navfilters import _moved
+from navfilters import FILTERS, _moved, run, sweep
 
 
 @pytest.mark.parametrize("old", _moved.MOVED)
@@ -34,6 +34,15 @@ def test_an_old_line_of_a_notebook(line, new):
     done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert new in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize("go", [run, sweep])
+@pytest.mark.parametrize("name", _moved.KEYWORDS)
+def test_an_old_keyword_says_the_new_one(go, name):
+    with pytest.raises(TypeError, match=rf"{name}.*since version 0\.2 that is (z_per_step|record)"):
+        go(FILTERS["EKF"], None, None, None, **{name: True})
+    with pytest.raises(TypeError, match="unexpected keyword argument 'colour'$"):
+        go(FILTERS["EKF"], None, None, None, colour=1)
 
 
 def test_what_never_was_is_missing_as_ever():

@@ -65,6 +65,21 @@ GONE = {
 """What does the work of an old module's functions that have no successor of their own."""
 
 
+KEYWORDS = {
+    "z_varies": "z_per_step",
+    "keep": "record: records.estimate, records.definite or records.Distance(truth)",
+    "truth": "record=records.Distance(truth)",
+}
+"""Old keywords of ``run`` and ``sweep``, and what does their work."""
+
+
+def refuse_old_keywords(function: str, given: dict) -> None:
+    """TypeError, saying the new name, for a keyword of version 0.1; or for one that never was."""
+    for name in given:
+        now = f"; since version 0.2 that is {KEYWORDS[name]}" if name in KEYWORDS else ""
+        raise TypeError(f"{function}() got an unexpected keyword argument {name!r}{now}")
+
+
 class Moved:
     """A finder that finds nothing, and says where it went."""
 

@@ -13,7 +13,8 @@ from navfilters.estimators.continuous import ContinuousSystem, extended_kalman_b
 from navfilters.estimators.robust import AdaptiveRobust, Robust
 from navfilters.models import RangeBearing
 from navfilters.numerics import validation
-from navfilters.runs.consistency import chi_square_band, coverage
+from navfilters.runs.chi_square import chi_square_band
+from navfilters.runs.consistency import coverage
 from navfilters.space.earth_fixed_orbit import EarthFixedOrbit
 from navfilters.space.inertial_orbit import Orbit
 

@@ -10,8 +10,8 @@ from naive import covariances
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import stats
 
+from navfilters.runs.chi_square import chi_square_band
 from navfilters.runs.consistency import (
-    chi_square_band,
     coverage,
     mean_nees,
     nees,

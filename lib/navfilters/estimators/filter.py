@@ -5,10 +5,9 @@
     predict --rule on P--> moments --variant--> update --retraction--> state
 """
 
-import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from navfilters.estimators import model_parts
 from navfilters.estimators.limits import LIMITS
 from navfilters.estimators.moments import linearized, second_order, unscented
+from navfilters.estimators.options import accepted, keywords
 from navfilters.estimators.prediction import (
     predict_linearized,
     predict_second_order,
@@ -107,15 +107,15 @@ class Filter:
             )
         self._know(options)
         prior, z = given_prior(prior), validation.given("z", z)
-        moments = self.moments(prior, model, **_accepted(self.moments, options))
-        changed, moments = self.variant(prior, model, moments, **_accepted(self.variant, options))
+        moments = self.moments(prior, model, **accepted(self.moments, options))
+        changed, moments = self.variant(prior, model, moments, **accepted(self.variant, options))
         updated = kalman_update(changed, z, moments, form=self.form, model=model)
         return kept(absent(z), prior, updated)
 
     @property
     def options(self) -> tuple[str, ...]:
         """Names of the keywords that this filter takes."""
-        return (*_keywords(self.moments), *_keywords(self.variant))
+        return (*keywords(self.moments), *keywords(self.variant))
 
     def having(self, **options) -> "Filter":
         """The same filter with these options.
@@ -138,7 +138,7 @@ class Filter:
         stages: dict[str, Any] = {}
         for name in ("moments", "variant"):
             stage = getattr(self, name)
-            if own := _accepted(stage, options):
+            if own := accepted(stage, options):
                 stages[name] = partial(stage, **own)
         return replace(self, **stages)
 
@@ -183,7 +183,7 @@ class Filter:
             Q, memory = self.rule.process_noise(memory, Q)
         function = getattr(self.moments, "func", self.moments)
         predict = PREDICTIONS.get(function, predict_linearized)
-        options = _accepted(predict, getattr(self.moments, "keywords", {}))
+        options = accepted(predict, getattr(self.moments, "keywords", {}))
         return state._replace(
             estimate=predict(state.estimate, dynamics, Q, **options), memory=memory
         )
@@ -283,19 +283,9 @@ class Filter:
         H, R = model.jacobian(prior.mean), model_parts.noise(model, prior.mean)
         P = prior.cov if self.rule is None else self.rule.limit(prior.cov)
         variant = model_parts.at(self.variant, 0)
-        given = getattr(variant, "keywords", {}) | _accepted(variant, options)
+        given = getattr(variant, "keywords", {}) | accepted(variant, options)
         P, R = LIMITS[getattr(variant, "func", variant)](P, H, R, **given)
         weight = H.mT @ np.linalg.inv(R)
         cov = np.linalg.inv(np.linalg.inv(P) + weight @ H)
         residual = z - (H @ prior.mean[..., None])[..., 0]
         return Gaussian(prior.mean + (cov @ weight @ residual[..., None])[..., 0], cov)
-
-
-@lru_cache  # a signature costs as much as half an update of one member
-def _keywords(function: Callable) -> tuple[str, ...]:
-    parameters = inspect.signature(function).parameters.values()
-    return tuple(p.name for p in parameters if p.default is not p.empty)
-
-
-def _accepted(function: Callable, options: dict) -> dict:
-    return {name: options[name] for name in _keywords(function) if name in options}

@@ -183,3 +183,30 @@ def unwritable(argument: Any) -> Any:
     view = argument.view()
     view.flags.writeable = False
     return view
+
+
+def first_member(x: np.ndarray, core: int = 1) -> np.ndarray:
+    """One member; of an empty batch, ones."""
+    return x[(0,) * (x.ndim - core)] if x.size else np.ones(x.shape[-core:])
+
+
+def alike(
+    name: str,
+    function: Callable,
+    x: np.ndarray,
+    core: tuple[int, ...],
+    own: tuple[int, ...],
+    *,
+    whole: bool,
+) -> None:
+    """One state, several in front of the model's own batch axes, and, but for a Hessian, all."""
+    options: dict[str, Any] = {"whole": whole, "finite": False}
+    one = first_member(x)
+    count = 1 + sum(core) + one.size  # no other axis is as long
+    near = 1 + 2.0**-10 * np.arange(count)
+    several = (near[:, None] * one).reshape(count, *(1,) * len(own), -1)
+    with np.errstate(all="ignore"):
+        probe(name, function, (one,), core, own, finite=False)
+        for states in [several, x] if x.size and x.ndim > 1 and len(core) < 3 else [several]:
+            batch = np.broadcast_shapes(states.shape[:-1], own)
+            members(name, function, (states,), 1, core, batch, own, **options)

@@ -35,6 +35,7 @@ from navfilters.oracles.two_by_two import (
     is_positive_definite,
     outer,
     spectral_norm,
+    spread_through,
     square_root,
 )
 
@@ -80,17 +81,6 @@ def _second_order_bias(x, p):
 
 
 # --- zhat, Pzz and Pxz of each filter ----------------------------------------------------------
-
-
-def _linear(x, p):
-    """H P H^T and P H^T, the terms of Eqs. (11) and (12)."""
-    a, b, c, d = _jacobian(x)
-    p11, p12, p22 = p
-    # P H^T: column i belongs to measurement i.
-    xz11, xz12 = p11 * a + p12 * b, p11 * c + p12 * d
-    xz21, xz22 = p12 * a + p22 * b, p12 * c + p22 * d
-    hph = (a * xz11 + b * xz21, a * xz12 + b * xz22, c * xz12 + d * xz22)
-    return hph, (xz11, xz12, xz21, xz22)
 
 
 def _ekf_noise(name, x, p, r, hph, bump):
@@ -176,10 +166,10 @@ def measurement_moments(name, x, p, r, *, bump=1, alpha=1, beta=2, kappa=1, root
     """
     noise = (r[0], mpf(0), r[1])
     if name in _EKF_FAMILY:
-        hph, pxz = _linear(x, p)
+        hph, pxz = spread_through(_jacobian(x), p)
         return _h(x), add(_ekf_noise(name, x, p, r, hph, bump), hph), pxz
     if name in _SOF_FAMILY:
-        hph, pxz = _linear(x, p)
+        hph, pxz = spread_through(_jacobian(x), p)
         bias = _second_order_bias(x, p)
         copies = 2 if name == "B-mtSOF" else 1
         pzz = add(add(noise, hph, copies), outer(bias), -1)

@@ -48,3 +48,14 @@ def square_root(p, root):
         t = mp.sqrt(p11 + p22 + 2 * s)
         return ((p11 + s) / t, p12 / t), (p12 / t, (p22 + s) / t)
     raise ValueError(f"root is 'cholesky' or 'symmetric', not {root!r}")
+
+
+def spread_through(h, p):
+    """H P H^T and P H^T, for a general H and a symmetric P."""
+    a, b, c, d = h
+    p11, p12, p22 = p
+    # P H^T: column i belongs to measurement i.
+    xz11, xz12 = p11 * a + p12 * b, p11 * c + p12 * d
+    xz21, xz22 = p12 * a + p22 * b, p12 * c + p22 * d
+    hph = (a * xz11 + b * xz21, a * xz12 + b * xz22, c * xz12 + d * xz22)
+    return hph, (xz11, xz12, xz21, xz22)

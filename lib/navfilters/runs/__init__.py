@@ -1,9 +1,9 @@
 """Runs: one history, or many configurations, on either engine; and tests of consistency."""
 
 from navfilters.runs import records
+from navfilters.runs.chi_square import chi_square_band
 from navfilters.runs.chunks import SweepError
 from navfilters.runs.consistency import (
-    chi_square_band,
     coverage,
     mean_nees,
     nees,

@@ -12,6 +12,7 @@ import numpy as np
 
 from navfilters.numerics import validation
 from navfilters.numerics.small_matrices import cholesky
+from navfilters.runs.chi_square import chi_square_band, tail_of
 
 
 def nees(error: Any, cov: Any) -> np.ndarray:
@@ -64,38 +65,6 @@ def nis(innovation: Any, S: Any) -> np.ndarray:
         As for :func:`nees`, with m degrees of freedom; NaN where there was no measurement.
     """
     return nees(innovation, S)
-
-
-def chi_square_band(dof: int, runs: Any = 1, confidence: float = 0.95) -> tuple[Any, Any]:
-    """Where the average over runs of a chi-square variable lies.
-
-    Parameters
-    ----------
-    dof : int
-        Degrees of freedom of each.
-    runs : int or int array (...)
-        How many are averaged.
-    confidence : float
-        Probability of the band, half of the rest on each side.
-
-    Returns
-    -------
-    tuple of float or array (...)
-        Lower and upper end.
-
-    Raises
-    ------
-    ValueError
-        A confidence not between 0 and 1, or fewer than one run or degree of freedom.
-    """
-    tail = _tail(confidence)
-    one, many = validation.number("dof", dof), validation.real_array("runs", runs, "")
-    if one < 1 or np.any(many < 1):
-        raise ValueError(f"dof and runs must be at least 1; found {dof} and {np.min(runs)}")
-    total = one * many
-    from scipy import stats  # it takes longer to import than the rest of the library
-
-    return tuple(stats.chi2.ppf(p, total) / many for p in (tail, 1 - tail))
 
 
 class MeanNees(NamedTuple):
@@ -192,7 +161,7 @@ def sample_deviation(
     ValueError
         As for :func:`mean_nees`; fewer than two finite runs.
     """
-    tail = _tail(confidence)
+    tail = tail_of(confidence)
     error, cov = _runs_first(error, cov, runs_axis)
     used = np.isfinite(error).all(-1) & np.isfinite(cov).all((-2, -1))
     runs = _counted(used, 2)
@@ -249,7 +218,7 @@ def coverage(
     ValueError
         As for :func:`mean_nees`; a k that is not positive.
     """
-    tail = _tail(confidence)
+    tail = tail_of(confidence)
     k = validation.number("k", k)
     if k <= 0:
         raise ValueError(f"k must be a positive number of deviations; found {k}")
@@ -265,13 +234,6 @@ def coverage(
     high = np.where(hits < n, stats.beta.ppf(1 - tail, hits + 1, np.maximum(n - hits, 1)), 1.0)
     expected = float(stats.chi2.cdf(k * k, 1))
     return Coverage(hits / n, low, high, expected, runs)
-
-
-def _tail(confidence: float) -> float:
-    confidence = validation.number("confidence", confidence)
-    if not 0 < confidence < 1:
-        raise ValueError(f"confidence must be between 0 and 1; found {confidence}")
-    return (1 - confidence) / 2
 
 
 def _runs_first(error: Any, cov: Any, runs_axis: int) -> tuple[np.ndarray, np.ndarray]:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from navfilters._moved import refuse_old_keywords
 from navfilters.estimators.any_filter import as_filter
 from navfilters.estimators.filter import Filter
 from navfilters.numerics import validation
@@ -25,6 +26,7 @@ def run(
     dynamics: Any = None,
     z_per_step: bool = False,
     record: Callable[[Any], Any] = records.estimate,
+    **old: Any,
 ) -> Any:
     """Repeat a step and keep what it leads to.
 
@@ -76,6 +78,7 @@ def run(
     >>> history.mean.round(2).tolist()
     [[20.0, 80.0], [77.36, 126.43], [55.32, 131.94]]
     """
+    refuse_old_keywords("run", old)
     estimator = as_filter(estimator)
     z_per_step = validation.flag("z_per_step", z_per_step)
     steps = model_checks.number_of_steps(steps, z, z_per_step)

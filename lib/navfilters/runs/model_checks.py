@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from navfilters.estimators.model_parts import at, noise
-from navfilters.numerics import probing, validation
-from navfilters.numerics.probing import unwritable
+from navfilters.numerics import validation
+from navfilters.numerics.probing import alike, first_member, unwritable
 from navfilters.runs.system_checks import refuse_systems
 from navfilters.types import Gaussian, MeasurementModel
 
@@ -136,7 +136,7 @@ def _fits(z, prior: Gaussian, model: MeasurementModel, axes: str, name: str) -> 
     m = measured_size(model, prior)
     if z.shape[-1] != m:
         raise ValueError(f"z must have shape ({axes}) with m = {m} as in model.R; found {z.shape}")
-    size = _statemeasured_size(model, prior.mean, m)
+    size = _state_size(model, prior.mean, m)
     if size not in (None, prior.cov.shape[-1]) and hasattr(model, "retract"):
         raise ValueError(
             f"{name}.cov must have shape (..., {size}, {size}) for this model; found "
@@ -203,7 +203,7 @@ def sensor(model: MeasurementModel, prior: Gaussian, *, name: str = "prior") -> 
         if function is None:
             continue
         try:
-            _alike(f"model.{part}", function, mean, core, own, whole=part == "h")
+            alike(f"model.{part}", function, mean, core, own, whole=part == "h")
         except NotImplementedError:  # none that the filter needs, it may be
             continue
         except ValueError as error:
@@ -249,14 +249,14 @@ def dynamics(model: Any, prior: Gaussian) -> None:
 
     state, square = mean.shape[-1:], (n, n)
     if "f" in known:
-        _alike("dynamics.f", model.f, mean, state, own, whole=True)
+        alike("dynamics.f", model.f, mean, state, own, whole=True)
     for name, count in (("transition", 2), ("propagate", 3)):
         if name in known:
             called = f"dynamics.{name}"
-            _alike(f"f(x) of {called}", part(name, 0, count), mean, state, own, whole=True)
-            _alike(f"F of {called}", part(name, 1, count), mean, square, own, whole=False)
+            alike(f"f(x) of {called}", part(name, 0, count), mean, state, own, whole=True)
+            alike(f"F of {called}", part(name, 1, count), mean, square, own, whole=False)
     if "propagate" in known:
-        _alike("W of dynamics.propagate", part("propagate", 2, 3), mean, square, own, whole=False)
+        alike("W of dynamics.propagate", part("propagate", 2, 3), mean, square, own, whole=False)
 
 
 def measured_size(model: MeasurementModel, prior: Gaussian) -> int:
@@ -267,7 +267,7 @@ def measured_size(model: MeasurementModel, prior: Gaussian) -> int:
         return np.shape(noise(model, first_member(prior.mean)))[-1]
 
 
-def _statemeasured_size(model: MeasurementModel, mean: np.ndarray, m: int) -> int | None:
+def _state_size(model: MeasurementModel, mean: np.ndarray, m: int) -> int | None:
     """The n of a jacobian (..., m, n), if it can be had: the state may be another model's."""
     try:
         with np.errstate(all="ignore"):
@@ -275,30 +275,3 @@ def _statemeasured_size(model: MeasurementModel, mean: np.ndarray, m: int) -> in
     except Exception:  # whatever it is, the probe will find it again
         return None
     return found[-1] if found[-2:-1] == (m,) else None
-
-
-def first_member(x: np.ndarray, core: int = 1) -> np.ndarray:
-    """One member; of an empty batch, ones."""
-    return x[(0,) * (x.ndim - core)] if x.size else np.ones(x.shape[-core:])
-
-
-def _alike(
-    name: str,
-    function: Callable,
-    x: np.ndarray,
-    core: tuple[int, ...],
-    own: tuple[int, ...],
-    *,
-    whole: bool,
-) -> None:
-    """One state, several in front of the model's own batch axes, and, but for a Hessian, all."""
-    options: dict[str, Any] = {"whole": whole, "finite": False}
-    one = first_member(x)
-    count = 1 + sum(core) + one.size  # no other axis is as long
-    near = 1 + 2.0**-10 * np.arange(count)
-    several = (near[:, None] * one).reshape(count, *(1,) * len(own), -1)
-    with np.errstate(all="ignore"):
-        probing.probe(name, function, (one,), core, own, finite=False)
-        for states in [several, x] if x.size and x.ndim > 1 and len(core) < 3 else [several]:
-            batch = np.broadcast_shapes(states.shape[:-1], own)
-            probing.members(name, function, (states,), 1, core, batch, own, **options)

@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any, Literal
 from uuid import uuid4
 
+from navfilters._moved import refuse_old_keywords
 from navfilters.estimators.any_filter import as_filter
 from navfilters.estimators.filter import Filter
 from navfilters.numerics import validation
@@ -65,6 +66,7 @@ def sweep(
     chunk: int | None = None,
     checkpoint: Any = None,
     progress: bool = True,
+    **old: Any,
 ) -> Sweep:
     """Run a filter over many configurations and keep what is asked for.
 
@@ -144,6 +146,7 @@ def sweep(
     >>> sweep(FILTERS["EKF"], priors, z, model, steps=2).final.mean.round(2).tolist()
     [[55.32, 131.94], [100.0, 100.0]]
     """
+    refuse_old_keywords("sweep", old)
     estimator = as_filter(estimator)
     if engine not in ("numpy", "jax"):
         raise ValueError(f"engine must be 'numpy' or 'jax'; found {engine!r}")

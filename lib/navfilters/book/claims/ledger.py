@@ -7,8 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-REPRODUCED = "reproduced"
-IN_SHAPE = "reproduced in shape"
+REPRODUCED, IN_SHAPE = "reproduced", "reproduced in shape"
 UNDERDETERMINED = "underdetermined"
 NOT_REPRODUCED = "not reproduced"
 ESTABLISHED = "established here"

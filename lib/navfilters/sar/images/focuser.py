@@ -1,13 +1,13 @@
 """From raw data to an image: range-Doppler focusing at an assumed velocity."""
 
 from copy import copy
-from typing import Protocol
 
 import numpy as np
 from scipy import fft
 from scipy.constants import c
 
 from navfilters.numerics import validation
+from navfilters.sar.images.raw_data import RawData
 from navfilters.sar.images.slant_image import Image
 from navfilters.sar.phase_blocks import (
     PIECE,
@@ -23,42 +23,6 @@ from navfilters.types import Array
 
 GUARD = 32
 """Samples on each side of a patch, over which it fades."""
-
-
-class RawData(Protocol):
-    """What the processor asks of raw data; all are attributes."""
-
-    @property
-    def samples(self) -> Array:
-        """Demodulated echoes, (pulses, ranges), complex."""
-
-    @property
-    def wavelength(self) -> float:
-        """Of the carrier, m."""
-
-    @property
-    def sampling(self) -> float:
-        """Complex samples in a second, Hz."""
-
-    @property
-    def prf(self) -> float:
-        """Pulses in a second, Hz."""
-
-    @property
-    def pulse_length(self) -> float:
-        """Of the chirp, s."""
-
-    @property
-    def chirp_rate(self) -> float:
-        """Of the chirp, Hz/s, negative if its frequency falls."""
-
-    @property
-    def near_range(self) -> float:
-        """Slant range of the first sample, m."""
-
-    @property
-    def first_time(self) -> float:
-        """Of the first pulse, s."""
 
 
 class Focuser:
