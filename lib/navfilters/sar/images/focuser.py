@@ -52,8 +52,7 @@ class Focuser:
     swath; over an image of 4.8 km the remaining migration is below 0.05 samples at its edges. The
     azimuth filter is exact at every range.
 
-    Only the range-compressed spectrum is kept, not the raw data. An image needs two inverse FFTs;
-    everything else is done on blocks of lines that fit the cache, in two threads.
+    Only the range-compressed spectrum is kept, not the raw data.
 
     References
     ----------
