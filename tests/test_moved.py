@@ -41,7 +41,7 @@ def test_an_old_line_of_a_notebook(line, new):
 def test_an_old_keyword_says_the_new_one(go, name):
     with pytest.raises(TypeError, match=rf"{name}.*since version 0\.2 that is (z_per_step|record)"):
         go(FILTERS["EKF"], None, None, None, **{name: True})
-    with pytest.raises(TypeError, match="unexpected keyword argument 'colour'$"):
+    with pytest.raises(TypeError, match=r"unexpected keyword argument 'colour'$"):
         go(FILTERS["EKF"], None, None, None, colour=1)
 
 

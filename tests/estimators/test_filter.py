@@ -23,7 +23,7 @@ from navfilters import (
     linearized,
     run,
 )
-from navfilters.estimators.filter import _keywords
+from navfilters.estimators.options import keywords
 from navfilters.estimators.variants import (
     bump_circular,
     bump_equivalent,
@@ -275,7 +275,7 @@ def test_a_variant_is_its_printed_equation(variant, plain):
     """Given any moments with P_xz = P H^T it changes what the equation names, and only that."""
     prior, _, model = nonlinear()
     z_hat, P_zz, P_xz = each(naive.second_order, *prior, model)
-    for bump in [{}] if "bump" not in _keywords(variant) else [{}, *bumps()]:
+    for bump in [{}] if "bump" not in keywords(variant) else [{}, *bumps()]:
         with_H = Moments(z_hat, P_zz, P_xz, model.jacobian(prior.mean), model.R)
         _, joseph = variant(prior, model, with_H, **bump)
         same, got = variant(prior, model, Moments(z_hat, P_zz, P_xz), **bump)
