@@ -41,6 +41,21 @@ def assert_close(got, wanted, atol):
     assert_allclose(got.cov / pair, wanted.cov / pair, rtol=0, atol=atol)
 
 
+@pytest.mark.parametrize("name", FILTERS.keys() - {"B-EKF 3"})
+def test_a_call_is_one_update(name):
+    """Of an image, with the attitude of the first; a lost one leaves its member as it was."""
+    prior, z, images, _ = flown()
+    z[0, 2, :3] = np.nan
+    prior = Gaussian(prior.mean, np.broadcast_to(prior.cov, (COUNT, 9, 9)))
+    with np.errstate(invalid="ignore"):  # of the image that is lost
+        got = FILTERS[name](prior, z[0], images)
+        wanted = FILTERS[name].update(FILTERS[name].init(prior), z[0], images, 0).estimate
+    assert_array_equal(got.mean, wanted.mean)
+    assert_array_equal(got.cov, wanted.cov)
+    assert_array_equal(got.mean[2], prior.mean[2])
+    assert np.all(np.delete(got.mean, 2, 0)[:, :3] != np.delete(prior.mean, 2, 0)[:, :3])
+
+
 @engines
 def test_the_multiplicative_ekf_is_swept_as_it_is_run(engine):
     """Each image with its own attitude, the first two underweighted; one of them is not matched."""

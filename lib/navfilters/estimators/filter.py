@@ -106,7 +106,8 @@ class Filter:
                 f"{type(self.rule).__name__}"
             )
         self._know(options)
-        prior, z = given_prior(prior), validation.given("z", z)
+        prior = given_prior(prior)
+        z, model = model_parts.seen(validation.given("z", z), model, 0)
         moments = self.moments(prior, model, **accepted(self.moments, options))
         changed, moments = self.variant(prior, model, moments, **accepted(self.variant, options))
         updated = kalman_update(changed, z, moments, form=self.form, model=model)

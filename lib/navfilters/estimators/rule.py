@@ -11,7 +11,7 @@ class Rule:
     """The rule that changes nothing; a base for others.
 
     A rule is a frozen dataclass of its tuning parameters. Its memory is a named tuple of arrays
-    with the batch axes in front, or None.
+    with the batch axes in front, or None. ``enlarge`` acts where the whole measurement was taken.
     """
 
     looks = False
