@@ -165,3 +165,11 @@ def test_it_imports_from_packages_only(path):
     for module, names in imported(path):
         package = hasattr(importlib.import_module(module), "__path__")
         assert package, (module, names)
+
+
+@every_notebook
+def test_a_cell_with_a_caption_shows_its_figure_alone(path):
+    """A caption names each output of its cell, and a name is given once."""
+    captioned = [c for c in code_cells(path) if "figure" in c.metadata.get("mystnb", {})]
+    shown = [[o for o in c.outputs if o.output_type != "stream"] for c in captioned]
+    assert [c.id for c, found in zip(captioned, shown, strict=True) if len(found) != 1] == []

@@ -51,7 +51,7 @@ class ByComplexStep:
         return _by_complex_step(f, x, 1e-30, self.name)
 
     def examine(self, *arguments: Any) -> np.ndarray:
-        """The Jacobian, compared with differences: TypeError as of :func:`complex_step`.
+        """The Jacobian, compared with differences; a TypeError as of ``complex_step``.
 
         Parameters
         ----------
@@ -112,7 +112,7 @@ def examine(derivative: Callable, points: list[tuple]) -> None:
     Raises
     ------
     TypeError
-        As of :func:`complex_step`.
+        As of :func:`~navfilters.numerics.complex_step.complex_step`.
     """
     if not isinstance(derivative, ByComplexStep):
         return

@@ -190,8 +190,8 @@ def second_order(
 ) -> tuple[float, float, float]:
     """The three sums of the expected NEES at the end: linear, shift and scatter.
 
-    sum |l_i|^2, (tr A_i)^2 and 2 tr A_i^2, where component i of the final error in units of P is
-    l_i^T xi - xi^T A_i xi of the unit normal numbers xi of a run.
+    sum norm(l_i)^2, (tr A_i)^2 and 2 tr A_i^2, where component i of the final error in units of P
+    is l_i^T xi - xi^T A_i xi of the unit normal numbers xi of a run.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ class CurrentNoise:
         dynamics: Dynamics,
         k: Array = 0,
     ) -> FilterState:
-        """A prediction and an update; as of :meth:`Filter.step`."""
+        """A prediction and an update; as of :meth:`navfilters.estimators.filter.Filter.step`."""
         adaptive = self._filter(self.rule)
         seen = adaptive.step(state, z, sensor, dynamics, k).memory
         window = state._replace(memory=seen._replace(factor=state.memory.factor))

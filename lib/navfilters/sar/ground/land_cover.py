@@ -72,7 +72,7 @@ PATCH = 120.0
 
 @dataclass(frozen=True, eq=False)
 class LandCover:
-    """Reflectivity of the ground on a raster about the middle of a :class:`LocalMap`.
+    """Reflectivity of the ground on a raster about the middle of a local map.
 
     Parameters
     ----------

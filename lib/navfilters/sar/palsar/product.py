@@ -20,7 +20,7 @@ _BLOCK = 256  # lines that the Doppler estimate holds at once
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """A product that :func:`open_product` has checked; samples stay in the file until read.
+    """A product that ``open_product`` has checked; samples stay in the file until read.
 
     Column k of every line is the echo at range near_range + k c / (2 sampling_rate), whatever the
     line's own window was: that of the first line that is not missing counts for all.
