@@ -32,7 +32,7 @@ class Memoryless:
         return first_state(prior)
 
     def predict(self, state: FilterState, dynamics: Any, k: Array = 0) -> FilterState:
-        """The state one transition later, by :func:`predict_linearized`."""
+        """The state one transition later, linearised."""
         dynamics = model_parts.at(dynamics, k)
         Q = validation.given("dynamics.Q", dynamics.Q)
         return state._replace(estimate=predict_linearized(state.estimate, dynamics, Q))
