@@ -41,7 +41,7 @@ def assert_close(got, wanted, atol):
     assert_allclose(got.cov / pair, wanted.cov / pair, rtol=0, atol=atol)
 
 
-@pytest.mark.parametrize("name", FILTERS.keys() - {"B-EKF 3"})
+@pytest.mark.parametrize("name", [name for name in FILTERS if name != "B-EKF 3"])
 def test_a_call_is_one_update(name):
     """Of an image, with the attitude of the first; a lost one leaves its member as it was."""
     prior, z, images, _ = flown()
