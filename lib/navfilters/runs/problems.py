@@ -1,5 +1,6 @@
 """The arguments of a sweep: checked, taken apart, and dealt out in chunks."""
 
+import sys
 from dataclasses import dataclass
 from math import prod
 from typing import Any
@@ -158,8 +159,10 @@ def probe_models(job: Job, problem: Problem) -> None:
         As of :mod:`navfilters.runs.model_checks`.
     """
     shapes = tuple((leaf.name, leaf.array.shape) for leaf in problem.leaves)
-    known = (job.tree, shapes, min(job.steps, 1)) if job.tree.constant else None
-    if known in SOUND:
+    jax = sys.modules.get("jax")
+    doubles = jax is None or jax.config.jax_enable_x64  # where a model may be one of JAX
+    known = (job.engine, doubles, job.tree, shapes, min(job.steps, 1))
+    if job.tree.constant and known in SOUND:
         return
     for size in (1, SEVERAL):
         march = March(job, problem.chunk(0, size).arrays)
@@ -175,7 +178,7 @@ def probe_models(job: Job, problem: Problem) -> None:
                 "fields of a dataclass, not in a closure, and those that are no matrices say so: "
                 'field(metadata={"axes": number}).)'
             ) from error
-    if known is not None:
+    if job.tree.constant:
         SOUND.add(known)
 
 
