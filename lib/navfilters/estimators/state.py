@@ -7,7 +7,7 @@ import numpy as np
 
 from navfilters.estimators.rule import Rule, zeros
 from navfilters.numerics import validation
-from navfilters.numerics.small_matrices import cholesky, is_positive_definite
+from navfilters.numerics.small_matrices import cholesky, is_positive_definite, whitened_square
 from navfilters.types import Array, Gaussian
 
 
@@ -45,12 +45,10 @@ class FilterState(NamedTuple):
         gone = xp.isnan(y) & ~xp.isnan(xp.linalg.diagonal(S))
         either = gone[..., :, None] | gone[..., None, :]
         L = cholesky(xp.where(either, xp.eye(y.shape[-1]), S))
-        w, y = list[Array](), xp.where(gone, 0.0, y)
-        for i in range(y.shape[-1]):
-            w.append((y[..., i] - sum(L[..., i, j] * w[j] for j in range(i))) / L[..., i, i])
+        square = whitened_square(L, xp.where(gone, 0.0, y))
         measured = xp.sum(~gone, axis=-1)
         logarithms = xp.sum(xp.log(xp.linalg.diagonal(L)), axis=-1)
-        return -sum(x * x for x in w) / 2 - logarithms - measured * (log(2 * pi) / 2)
+        return -square / 2 - logarithms - measured * (log(2 * pi) / 2)
 
     @property
     def healthy(self) -> Array:

@@ -131,6 +131,26 @@ def cholesky(A: Array) -> Array:
     return matrix(L)
 
 
+def whitened_square(L: Array, y: Array) -> Array:
+    """y^T (L L^T)^-1 y by forward substitution, for each pair of a stack.
+
+    Parameters
+    ----------
+    L : array (..., n, n)
+        Lower triangular, as of :func:`cholesky`.
+    y : array (..., n)
+
+    Returns
+    -------
+    array (...)
+        NaN where L has no factor.
+    """
+    w: list[Array] = []
+    for i in range(y.shape[-1]):
+        w.append((y[..., i] - sum(L[..., i, j] * w[j] for j in range(i))) / L[..., i, i])
+    return sum(x * x for x in w)
+
+
 def _rounding(n: int) -> float:
     return 8 * n * float(np.finfo(float).eps)
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from navfilters.numerics import validation
-from navfilters.numerics.small_matrices import cholesky
+from navfilters.numerics.small_matrices import cholesky, whitened_square
 from navfilters.runs.chi_square import chi_square_band, tail_of
 
 
@@ -42,10 +42,7 @@ def nees(error: Any, cov: Any) -> np.ndarray:
     variance = np.diagonal(cov, axis1=-2, axis2=-1)
     scale = 1 / np.sqrt(np.where(variance > 0, variance, np.nan))
     L = cholesky(scale[..., :, None] * cov * scale[..., None, :])
-    e, w = scale * error, list[np.ndarray]()
-    for i in range(e.shape[-1]):
-        w.append((e[..., i] - sum(L[..., i, j] * w[j] for j in range(i))) / L[..., i, i])
-    return sum(x * x for x in w)
+    return whitened_square(L, scale * error)
 
 
 def nis(innovation: Any, S: Any) -> np.ndarray:
