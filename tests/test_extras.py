@@ -8,8 +8,8 @@ import textwrap
 import pytest
 
 EXTRAS = (
-    "matplotlib", "mpl_toolkits", "mpmath", "IPython", "jax", "pymap3d", "cv2", "rasterio", "astropy",
-    "joblib", "tqdm", "dask", "distributed",
+    "matplotlib", "mpl_toolkits", "mpmath", "IPython", "jax", "pymap3d", "cv2", "rasterio",
+    "astropy", "joblib", "tqdm", "dask", "distributed",
 )  # fmt: skip
 BARE = f"""
 import sys
