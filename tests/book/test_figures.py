@@ -17,7 +17,7 @@ KERNEL = """([name, R, wrap, points, steps]) => {
     let state = { mean: [20, 80], cov: [1e4, 0, 0, 1e4] };
     const errors = [];
     for (let k = 0; k < steps; k++) {
-        state = kernel.update(name, state, z, { R, wrap }, points);
+        state = kernel.update(name, state, z, { R, wrap }, points ?? kernel.POINTS);
         errors.push(kernel.distance(state.mean, [100, 100]));
     }
     return errors;

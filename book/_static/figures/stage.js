@@ -144,7 +144,7 @@
   }
   function slider(text, { min, max, step, shown = digits }, get, set) {
     const control = element("input", { type: "range", min, max, step, oninput: () => set(Number(control.value)) });
-    const value = element("output");
+    const value = element("span");
     return { node: element("label", {}, element("span", {}, text, " ", value), control), show: () => { control.value = get(); value.textContent = shown(get()); control.setAttribute("aria-valuetext", value.textContent); } };
   }
   function toggle(text, get, set) {
@@ -156,7 +156,7 @@
   // ---- the state of a figure, in the address behind #
   function fromAddress(name, state) {
     const given = new URLSearchParams(location.hash.slice(1));
-    if (given.get("figure") !== name) return state;
+    if (given.get("figure") !== name) return { ...state };
     const read = (key, like) => {
       const text = given.get(key);
       if (text === null) return like;
@@ -184,7 +184,7 @@
         Object.assign(state, changes);
         if (!waiting) { waiting = true; requestAnimationFrame(paint); }
         clearTimeout(timer);
-        timer = setTimeout(() => { try { toAddress(name, state, first); } catch { /* a page that is a file */ } }, 300);
+        timer = setTimeout(() => { try { toAddress(name, state, first); } catch { /* some browsers refuse it in a page that is a file */ } }, 300);
       },
     };
     const { nodes, controls, draw: inner } = build(self);
