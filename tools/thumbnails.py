@@ -35,11 +35,12 @@ def figures() -> dict[str, bytes]:
 
 
 def small(picture: bytes) -> Image.Image:
-    """The whole picture, on white, in the size of a card."""
+    """The picture in the width of a card, on white; what is taller is cut below."""
     image = Image.open(io.BytesIO(picture)).convert("RGB")
-    image.thumbnail(SIZE)
+    width, height = SIZE
+    tall = round(image.height * width / image.width)
     card = Image.new("RGB", SIZE, "white")
-    card.paste(image, ((SIZE[0] - image.width) // 2, (SIZE[1] - image.height) // 2))
+    card.paste(image.resize((width, tall)), (0, max(0, (height - tall) // 2)))
     return card
 
 
