@@ -19,15 +19,15 @@
 
     const controls = {};
     const labelled = (text, control) => make("label", {}, make("span", {}, text), control);
-    controls.search = make("input", { type: "search", oninput: () => change({ search: controls.search.value }) });
+    controls.search = make("input", { type: "search", name: "search", oninput: () => change({ search: controls.search.value }) });
     const nodes = [labelled("Search", controls.search)];
     for (const [name, key] of Object.entries(FILTERS)) {
       const values = [...new Set(claims.map((c) => c[key]))].filter(Boolean);
-      controls[name] = make("select", { onchange: () => change({ [name]: controls[name].value }) },
+      controls[name] = make("select", { name, onchange: () => change({ [name]: controls[name].value }) },
         make("option", { value: "" }, "all"), ...values.map((v) => make("option", { value: v }, v)));
       nodes.push(labelled(name === "limit" ? "Limit" : name[0].toUpperCase() + name.slice(1), controls[name]));
     }
-    controls.order = make("select", { onchange: () => change({ order: controls.order.value }) },
+    controls.order = make("select", { name: "order", onchange: () => change({ order: controls.order.value }) },
       ...Object.keys(ORDERS).map((name) => make("option", { value: ORDERS[name] ?? "" }, name)));
     nodes.push(labelled("Order", controls.order));
     const count = make("p", { className: "claims-count" });
