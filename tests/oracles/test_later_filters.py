@@ -2,12 +2,13 @@
 
 import ast
 import inspect
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from navfilters import FILTERS, Gaussian, run
-from navfilters.estimators import LATER_FILTERS
+from navfilters.estimators import LATER_FILTERS, bump_circular
 from navfilters.models import RangeBearing
 from navfilters.oracles import later_filters as oracle
 
@@ -40,14 +41,20 @@ def test_sixty_digits(name, setup):
         assert np.abs(got.cov[k] - P).max() < 1e-6 * np.abs(P).max()
 
 
-@pytest.mark.parametrize("name", oracle.NAMES)
-def test_many_runs(name):
+BUMPED = [name for name in oracle.NAMES if name != "RUF"]
+
+
+@pytest.mark.parametrize(
+    ("name", "circular"), [(n, False) for n in oracle.NAMES] + [(n, True) for n in BUMPED]
+)
+def test_many_runs(name, circular):
     prior, z, model = problem(*SETUPS["baseline"])
     noise = np.random.default_rng(0).standard_normal((8, 20, 2))
     z = z + noise * np.sqrt(np.diagonal(model.R))
     _, x0, sigma, R = SETUPS["baseline"]
-    mean, cov = oracle.runs(name, x0, sigma, R, z)
-    got = run(ALL[name], prior, z, model, z_per_step=True)
+    mean, cov = oracle.runs(name, x0, sigma, R, z, circular=circular)
+    filter_ = replace(ALL[name], variant=bump_circular) if circular else ALL[name]
+    got = run(filter_, prior, z, model, z_per_step=True)
     # Full steps of the iterated EKF amplify rounding in a run that they throw far away.
     apart = np.abs(got.mean[1:] - mean).max(axis=(0, 2))
     assert np.median(apart) < 1e-6
@@ -66,4 +73,4 @@ def test_it_shares_nothing_with_the_package():
     imported = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)} | {
         a.name for node in ast.walk(tree) if isinstance(node, ast.Import) for a in node.names
     }
-    assert imported == {"mpmath", "numpy"}
+    assert imported == {"mpmath", "numpy", "navfilters.oracles.two_by_two"}

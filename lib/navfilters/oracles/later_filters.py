@@ -17,53 +17,21 @@ try:
 except ImportError:
     raise ImportError("this oracle needs mpmath: pip install navfilters[book]") from None
 
+from navfilters.oracles.two_by_two import (
+    add,
+    applied,
+    full,
+    general_inverse,
+    inverse,
+    product,
+    symmetric,
+    transposed,
+)
+
 CUBATURE, UNSCENTED = (1, 0, 0), (1, 2, 1)
 """(alpha, beta, kappa) of the sigma points."""
 
 NAMES = ("EKF", "GSOF", "CKF", "UKF", "IEKF", "IPLF", "RUF", "RC-EKF", "RC-UKF")
-
-
-# --- 2x2 algebra -------------------------------------------------------------------------------
-
-
-def _inverse(p):
-    p11, p12, p22 = p
-    det = p11 * p22 - p12 * p12
-    return p22 / det, -p12 / det, p11 / det
-
-
-def _full(p):
-    return p[0], p[1], p[1], p[2]
-
-
-def _product(a, b):
-    return (
-        a[0] * b[0] + a[1] * b[2],
-        a[0] * b[1] + a[1] * b[3],
-        a[2] * b[0] + a[3] * b[2],
-        a[2] * b[1] + a[3] * b[3],
-    )
-
-
-def _transposed(a):
-    return a[0], a[2], a[1], a[3]
-
-
-def _applied(a, v):
-    return a[0] * v[0] + a[1] * v[1], a[2] * v[0] + a[3] * v[1]
-
-
-def _plus(a, b, factor=1):
-    return tuple(u + factor * v for u, v in zip(a, b, strict=True))
-
-
-def _symmetric(a):
-    return a[0], (a[1] + a[2]) / 2, a[3]
-
-
-def _general_inverse(a):
-    det = a[0] * a[3] - a[1] * a[2]
-    return a[3] / det, -a[1] / det, -a[2] / det, a[0] / det
 
 
 # --- the measurement ---------------------------------------------------------------------------
@@ -101,12 +69,9 @@ def _curvature(x, p):
         (x2 * x2 / r3, -x1 * x2 / r3, x1 * x1 / r3),
         (2 * x1 * x2 / r4, (x2 * x2 - x1 * x1) / r4, -2 * x1 * x2 / r4),
     )
-    one, two = (_product(_full(a), _full(p)) for a in A)
+    one, two = (product(full(a), full(p)) for a in A)
     b = tuple((m[0] + m[3]) / 2 for m in (one, two))
-    C = tuple(
-        (product[0] + product[3]) / 2
-        for product in (_product(one, one), _product(one, two), _product(two, two))
-    )
+    C = tuple((m[0] + m[3]) / 2 for m in (product(one, one), product(one, two), product(two, two)))
     return b, C
 
 
@@ -122,7 +87,7 @@ def _quadratic(x, p, r):
     """Second order of a Gaussian: Athans, Wishner and Bertolini 1968."""
     b, C = _curvature(x, p)
     z, H, noise = _expanded(x, p, r)
-    return (z[0] + b[0], z[1] + b[1]), H, _plus(noise, C)
+    return (z[0] + b[0], z[1] + b[1]), H, add(noise, C)
 
 
 def _regressed(x, p, r, points):
@@ -147,22 +112,31 @@ def _regressed(x, p, r, points):
         for i in (0, 1)
         for j in (0, 1)
     )
-    H = _product(cross, _full(_inverse(p)))
+    H = product(cross, full(inverse(p)))
     rest = (r[0] + central * shift[0] ** 2, central * shift[0] * shift[1], r[1])
     rest = (rest[0], rest[1], rest[2] + central * shift[1] ** 2)
     for d, o in zip(spread, offsets, strict=True):
-        on_line = _applied(H, o)
+        on_line = applied(H, o)
         e = d[0] - on_line[0], d[1] - on_line[1]
-        rest = _plus(rest, (e[0] * e[0], e[0] * e[1], e[1] * e[1]), w)
+        rest = add(rest, (e[0] * e[0], e[0] * e[1], e[1] * e[1]), w)
     return (middle[0] + shift[0], middle[1] + shift[1]), H, rest
 
 
-def _affine(name, x, p, r):
+def _affine(name, x, p, r, size):
+    """Of one filter; with size times H H^T more noise, Eq. (15) of Perea and others 2007."""
     if name in ("CKF", "IPLF"):
-        return _regressed(x, p, r, CUBATURE)
-    if name in ("UKF", "RC-UKF"):
-        return _regressed(x, p, r, UNSCENTED)
-    return (_quadratic if name == "GSOF" else _expanded)(x, p, r)
+        z, H, noise = _regressed(x, p, r, CUBATURE)
+    elif name in ("UKF", "RC-UKF"):
+        z, H, noise = _regressed(x, p, r, UNSCENTED)
+    else:
+        z, H, noise = (_quadratic if name == "GSOF" else _expanded)(x, p, r)
+    distance = x[0] * x[0] + x[1] * x[1]
+    return z, H, add(noise, (size, 0 * size, size / distance))
+
+
+def _largest_eigenvalue(p):
+    half = (p[0] - p[2]) / 2
+    return (p[0] + p[2]) / 2 + _of(half).sqrt(half * half + p[1] * p[1])
 
 
 # --- updates -----------------------------------------------------------------------------------
@@ -170,20 +144,20 @@ def _affine(name, x, p, r):
 
 def _informed(x, p, y, H, noise):
     """(P^-1 + H^T N^-1 H)^-1, the gain that belongs to it, and the state."""
-    weight = _product(_transposed(H), _full(_inverse(noise)))
-    after = _inverse(_plus(_inverse(p), _symmetric(_product(weight, H))))
-    K = _product(_full(after), weight)
-    step = _applied(K, y)
+    weight = product(transposed(H), full(inverse(noise)))
+    after = inverse(add(inverse(p), symmetric(product(weight, H))))
+    K = product(full(after), weight)
+    step = applied(K, y)
     return (x[0] + step[0], x[1] + step[1]), after, K
 
 
-def _iterated(name, x, p, z, r, iterations):
+def _iterated(name, x, p, z, r, size, iterations):
     """Bell and Cathey 1993; Garcia-Fernandez and others 2015."""
     mean, cov = x, p
     for _ in range(iterations):
-        z_hat, H, noise = _affine(name, mean, cov, r)
+        z_hat, H, noise = _affine(name, mean, cov, r, size)
         y = _residual(z, z_hat)
-        back = _applied(H, (x[0] - mean[0], x[1] - mean[1]))
+        back = applied(H, (x[0] - mean[0], x[1] - mean[1]))
         mean, cov, _ = _informed(x, p, (y[0] - back[0], y[1] - back[1]), H, noise)
     return mean, cov
 
@@ -191,33 +165,33 @@ def _iterated(name, x, p, z, r, iterations):
 def _recursive(x, p, z, r, updates):
     """Zanetti 2012, with C the covariance of error and noise."""
     R, one = (r[0], 0 * r[0], 0 * r[0], r[1]), (1, 0, 0, 1)
-    P, C = _full(p), (0 * r[0],) * 4
+    P, C = full(p), (0 * r[0],) * 4
     for i in range(1, updates + 1):
         H = _jacobian(x)
-        PH = _product(P, _transposed(H))
-        HC = _product(H, C)
-        S = _plus(_plus(_product(H, PH), R), _plus(HC, _transposed(HC)))
-        K = _product(_plus(PH, C), _general_inverse(S))
+        PH = product(P, transposed(H))
+        HC = product(H, C)
+        S = add(add(product(H, PH), R), add(HC, transposed(HC)))
+        K = product(add(PH, C), general_inverse(S))
         K = tuple(k / (updates + 1 - i) for k in K)
-        step = _applied(K, _residual(z, _h(x)))
+        step = applied(K, _residual(z, _h(x)))
         x = x[0] + step[0], x[1] + step[1]
-        A = _plus(one, _product(K, H), -1)
-        KR = _product(K, R)
-        mixed = _product(_product(A, C), _transposed(K))
-        quiet = _product(_product(A, P), _transposed(A))
-        P = _plus(_plus(quiet, _product(KR, _transposed(K))), _plus(mixed, _transposed(mixed)), -1)
-        C = _plus(_product(A, C), KR, -1)
-    return x, _symmetric(P)
+        A = add(one, product(K, H), -1)
+        KR = product(K, R)
+        mixed = product(product(A, C), transposed(K))
+        quiet = product(product(A, P), transposed(A))
+        P = add(add(quiet, product(KR, transposed(K))), add(mixed, transposed(mixed)), -1)
+        C = add(product(A, C), KR, -1)
+    return x, symmetric(P)
 
 
-def _recalibrated(name, x, p, z, r):
+def _recalibrated(name, x, p, z, r, size):
     """Jiang, Shi and Moura 2024: the covariance of this gain about the new state, or nothing."""
-    z_hat, H, noise = _affine(name, x, p, r)
+    z_hat, H, noise = _affine(name, x, p, r, size)
     mean, _, K = _informed(x, p, _residual(z, z_hat), H, noise)
-    _, H, noise = _affine(name, mean, p, r)
-    A = _plus((1, 0, 0, 1), _product(K, H), -1)
-    quiet = _product(_product(A, _full(p)), _transposed(A))
-    cov = _symmetric(_plus(quiet, _product(_product(K, _full(noise)), _transposed(K))))
+    _, H, noise = _affine(name, mean, p, r, size)
+    A = add((1, 0, 0, 1), product(K, H), -1)
+    quiet = product(product(A, full(p)), transposed(A))
+    cov = symmetric(add(quiet, product(product(K, full(noise)), transposed(K))))
     worse = cov[0] + cov[2] >= p[0] + p[2]
     if isinstance(worse, np.ndarray):
         return tuple(
@@ -227,7 +201,7 @@ def _recalibrated(name, x, p, z, r):
     return (x, p) if worse else (mean, cov)
 
 
-def update(name, x, p, z, r, *, iterations=10):
+def update(name, x, p, z, r, *, iterations=10, circular=False):
     """One update.
 
     Parameters
@@ -240,6 +214,8 @@ def update(name, x, p, z, r, *, iterations=10):
         Covariance.
     iterations : int
         Of IEKF and IPLF; updates of the RUF.
+    circular : bool
+        Whether the noise is enlarged as in B-EKF 2; not for the RUF.
 
     Returns
     -------
@@ -248,31 +224,30 @@ def update(name, x, p, z, r, *, iterations=10):
     """
     if name not in NAMES:
         raise ValueError(f"unknown filter {name!r}; the names are {', '.join(NAMES)}")
-    if name in ("IEKF", "IPLF"):
-        return _iterated(name, x, p, z, r, iterations)
     if name == "RUF":
         return _recursive(x, p, z, r, iterations)
+    size = _largest_eigenvalue(p) if circular else 0 * r[0]
     if name.startswith("RC-"):
-        return _recalibrated(name, x, p, z, r)
-    return _iterated(name, x, p, z, r, 1)
+        return _recalibrated(name, x, p, z, r, size)
+    return _iterated(name, x, p, z, r, size, iterations if name in ("IEKF", "IPLF") else 1)
 
 
-def history(name, x0, sigma, R, z, *, steps=1000, digits=60, iterations=10, keep=None):
+def history(name, x0, sigma, R, z, *, steps=1000, digits=60, keep=None, **options):
     """One filter over equal measurements, in so many digits.
 
     Parameters
     ----------
     name : str
         One of `NAMES`.
-    x0, R : pairs of numbers
-        First estimate; variances of range and bearing.
+    x0, R, z : pairs of numbers
+        First estimate; variances of range and bearing; the measurement.
     sigma : number
         Deviation of the first estimate, the same in both directions.
-    z : pair of numbers
-        The measurement.
-    steps, digits, iterations : int
+    steps, digits : int
     keep : iterable of int, optional
         The steps to return, 0 being the start; all by default.
+    **options
+        Of `update`.
 
     Returns
     -------
@@ -286,23 +261,14 @@ def history(name, x0, sigma, R, z, *, steps=1000, digits=60, iterations=10, keep
         kept = []
         for k in range(steps + 1):
             if k:
-                x, p = update(name, x, p, z, r, iterations=iterations)
+                x, p = update(name, x, p, z, r, **options)
             if k in wanted:
                 kept.append((x, p))
     return kept
 
 
-def runs(name, x0, sigma, R, z, *, iterations=10):
-    """One filter over many runs, in doubles.
-
-    Parameters
-    ----------
-    name : str
-        One of `NAMES`.
-    x0, R : pairs of numbers
-    sigma : number
-    z : array (steps, runs, 2)
-    iterations : int
+def runs(name, x0, sigma, R, z, **options):
+    """As `history`, of many runs in doubles, with measurements z (steps, runs, 2).
 
     Returns
     -------
@@ -316,7 +282,7 @@ def runs(name, x0, sigma, R, z, *, iterations=10):
     means, covs = [], []
     with np.errstate(all="ignore"):
         for now in np.asarray(z):
-            x, p = update(name, x, p, (now[:, 0], now[:, 1]), r, iterations=iterations)
+            x, p = update(name, x, p, (now[:, 0], now[:, 1]), r, **options)
             means.append(np.stack(x, -1))
-            covs.append(np.stack(_full(p), -1).reshape(count, 2, 2))
+            covs.append(np.stack(full(p), -1).reshape(count, 2, 2))
     return np.array(means), np.array(covs)
