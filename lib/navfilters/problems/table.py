@@ -56,7 +56,9 @@ class Cell:
     reason: str = ""
 
 
-def cells(problem: Problem, cure: Cure, runs: int, seed: int = 0) -> list[Cell]:
+def cells(
+    problem: Problem, cure: Cure, runs: int, seed: int = 0, *, scan: bool = True
+) -> list[Cell]:
     """A cure on a problem with its own value, and with every other value to be tried.
 
     Parameters
@@ -65,6 +67,8 @@ def cells(problem: Problem, cure: Cure, runs: int, seed: int = 0) -> list[Cell]:
     cure : Cure
     runs : int
     seed : int
+    scan : bool
+        Whether the other values are tried.
 
     Returns
     -------
@@ -79,7 +83,7 @@ def cells(problem: Problem, cure: Cure, runs: int, seed: int = 0) -> list[Cell]:
     own = cure.value if cure.scanned else None
     outcome = treat(problem, estimator, runs, seed, believed=believed)
     found = [_cell(problem, cure, own, outcome, (), cost)]
-    others = [value for value in cure.scanned if value != cure.value]
+    others = [value for value in cure.scanned if scan and value != cure.value]
     if others:
         believed, estimator = cure.apply(problem, np.array(others)[:, None])
         outcome = treat(problem, estimator, runs, seed, believed=believed, settings=len(others))
@@ -140,23 +144,3 @@ def table(
 
 def _part(problem: Problem, cures: list[Cure], runs: int) -> list[Cell]:
     return [cell for cure in cures for cell in cells(problem, cure, runs)]
-
-
-def best(found: Iterable[Cell]) -> list[Cell]:
-    """Of the values of each cure's parameter on each problem, that with the smallest error.
-
-    Parameters
-    ----------
-    found : iterable of Cell
-
-    Returns
-    -------
-    list of Cell
-        One for each pair: chosen in hindsight.
-    """
-    chosen: dict[tuple[str, str], Cell] = {}
-    for cell in found:
-        key = cell.problem, cell.cure
-        if key not in chosen or cell.ratio < chosen[key].ratio:
-            chosen[key] = cell
-    return list(chosen.values())

@@ -70,14 +70,14 @@ def honesty_matrix(
     """
     ratio, honesty = np.asarray(ratio, float), np.asarray(honesty, float)
     figure, ax = plt.subplots(figsize=(4.3, 0.9 + 0.275 * len(rows)))
-    shades = plt.get_cmap("cividis_r")
+    shades = plt.get_cmap("YlOrBr")
     with np.errstate(all="ignore"):
         level = np.clip(np.log10(ratio) / np.log10(worst), 0, 1)
     for i, j in np.ndindex(ratio.shape):
         if np.isnan(ratio[i, j]):
             ax.text(j, i, "–", ha="center", va="center", fontsize=7, color="0.5")
             continue
-        shade = shades(0.9 * level[i, j]) if level[i, j] > 0 else (1.0, 1.0, 1.0, 1.0)
+        shade = shades(0.95 * level[i, j]) if level[i, j] > 0 else (1.0, 1.0, 1.0, 1.0)
         ax.add_patch(Rectangle((j - 0.5, i - 0.5), 1, 1, facecolor=shade, edgecolor="0.8", lw=0.4))
         ink = "white" if np.dot(shade[:3], (0.3, 0.6, 0.1)) < 0.5 else "black"
         text = {"ha": "center", "va": "center", "color": ink}
