@@ -80,7 +80,7 @@ def honesty_matrix(
         shade = shades(0.95 * level[i, j]) if level[i, j] > 0 else (1.0, 1.0, 1.0, 1.0)
         ax.add_patch(Rectangle((j - 0.5, i - 0.5), 1, 1, facecolor=shade, edgecolor="0.8", lw=0.4))
         ink = "white" if np.dot(shade[:3], (0.3, 0.6, 0.1)) < 0.5 else "black"
-        text = {"ha": "center", "va": "center", "color": ink}
+        text: dict[str, Any] = {"ha": "center", "va": "center", "color": ink}
         ax.text(j, i - 0.23, compact(ratio[i, j]), fontsize=7, fontweight="bold", **text)
         mark = MARKS[int(honest[i][j])]
         ax.text(j, i + 0.24, f"{mark}{compact(honesty[i, j])}", fontsize=5.8, **text)
