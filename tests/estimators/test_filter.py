@@ -222,7 +222,8 @@ def test_without_an_h_both_forms_are_the_same_line():
 
 
 def test_an_unknown_form_is_refused():
-    with pytest.raises(ValueError, match=r"form must be one of \['joseph', 'short'\]; found 'UD'"):
+    message = r"form must be one of \['joseph', 'short', 'sqrt'\]; found 'UD'"
+    with pytest.raises(ValueError, match=message):
         Filter(form="UD")
 
 

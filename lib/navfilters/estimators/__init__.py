@@ -2,9 +2,12 @@
 
 from navfilters.estimators.adaptive import AdaptiveNoise
 from navfilters.estimators.any_filter import as_filter
-from navfilters.estimators.catalogue import FILTERS
+from navfilters.estimators.catalogue import FILTERS, LATER_FILTERS
+from navfilters.estimators.correction import iterated, once, recalibrated, recursive
 from navfilters.estimators.filter import Filter
 from navfilters.estimators.moments import (
+    cubature,
+    gaussian_second_order,
     linearized,
     second_order,
     second_order_bias,
@@ -27,6 +30,7 @@ from navfilters.estimators.variants import (
 
 __all__ = [
     "FILTERS",
+    "LATER_FILTERS",
     "AdaptiveNoise",
     "AdaptiveRobust",
     "Filter",
@@ -40,9 +44,15 @@ __all__ = [
     "bump_linear",
     "bump_predicted",
     "bump_state",
+    "cubature",
     "expect_at_mean",
+    "gaussian_second_order",
+    "iterated",
     "kalman_update",
     "linearized",
+    "once",
+    "recalibrated",
+    "recursive",
     "second_order",
     "second_order_bias",
     "sigma_points",

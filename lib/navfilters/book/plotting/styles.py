@@ -12,7 +12,7 @@ except ImportError as error:
 
 EKF, SECOND_ORDER, UKF, MEASUREMENT = "#D55E00", "#009E73", "#0072B2", "#E69F00"
 
-ROBUST = "#CC79A7"
+ROBUST, CORRECTED = "#CC79A7", "#882255"
 
 TRUTH, BOUND = "black", "0.55"
 
@@ -39,6 +39,14 @@ _VARIANTS = {
     "REKF": (ROBUST, "plain", "o"),
     "AEKF": (ROBUST, "dashed", "s"),
     "AREKF": (ROBUST, "dash-dot-dot", "P"),
+    "SR-EKF": (EKF, "dash-dot-dot", "P"),
+    "GSOF": (SECOND_ORDER, "dotted", "^"),
+    "CKF": (UKF, "dotted", "^"),
+    "IEKF": (CORRECTED, "plain", "o"),
+    "RUF": (CORRECTED, "dashed", "s"),
+    "IPLF": (CORRECTED, "dotted", "^"),
+    "RC-EKF": (CORRECTED, "dash-dot", "D"),
+    "RC-UKF": (CORRECTED, "long dash", "v"),
 }
 
 STYLES: dict[str, dict[str, Any]] = {
