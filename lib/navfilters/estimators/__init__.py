@@ -4,6 +4,7 @@ from navfilters.estimators.adaptive import AdaptiveNoise
 from navfilters.estimators.any_filter import as_filter
 from navfilters.estimators.catalogue import FILTERS
 from navfilters.estimators.filter import Filter
+from navfilters.estimators.gated_inflation import GatedInflation
 from navfilters.estimators.moments import (
     linearized,
     second_order,
@@ -14,6 +15,7 @@ from navfilters.estimators.robust import AdaptiveRobust, Robust, trace_ratio
 from navfilters.estimators.rule import Rule
 from navfilters.estimators.sigma_points import SigmaPoints, sigma_points
 from navfilters.estimators.state import FilterState
+from navfilters.estimators.strong_tracking import StrongTracking
 from navfilters.estimators.update import kalman_update
 from navfilters.estimators.variants import (
     bump_circular,
@@ -31,9 +33,11 @@ __all__ = [
     "AdaptiveRobust",
     "Filter",
     "FilterState",
+    "GatedInflation",
     "Robust",
     "Rule",
     "SigmaPoints",
+    "StrongTracking",
     "as_filter",
     "bump_circular",
     "bump_equivalent",
