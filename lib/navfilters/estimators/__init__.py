@@ -3,8 +3,11 @@
 from navfilters.estimators.adaptive import AdaptiveNoise
 from navfilters.estimators.any_filter import as_filter
 from navfilters.estimators.catalogue import FILTERS
+from navfilters.estimators.consider import considering
+from navfilters.estimators.converted import expecting_noise
 from navfilters.estimators.filter import Filter
 from navfilters.estimators.gated_inflation import GatedInflation
+from navfilters.estimators.interacting import InteractingModels, Modes
 from navfilters.estimators.moments import (
     linearized,
     second_order,
@@ -26,6 +29,7 @@ from navfilters.estimators.variants import (
     expect_at_mean,
     unchanged,
 )
+from navfilters.estimators.variational_noise import VariationalNoise
 
 __all__ = [
     "FILTERS",
@@ -34,17 +38,22 @@ __all__ = [
     "Filter",
     "FilterState",
     "GatedInflation",
+    "InteractingModels",
+    "Modes",
     "Robust",
     "Rule",
     "SigmaPoints",
     "StrongTracking",
+    "VariationalNoise",
     "as_filter",
     "bump_circular",
     "bump_equivalent",
     "bump_linear",
     "bump_predicted",
     "bump_state",
+    "considering",
     "expect_at_mean",
+    "expecting_noise",
     "kalman_update",
     "linearized",
     "second_order",
