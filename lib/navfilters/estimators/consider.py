@@ -18,7 +18,7 @@ from navfilters.types import Array, Gaussian, MeasurementModel, Moments
 class Consider:
     """A variant without gain in some of the states; see :func:`considering`."""
 
-    states: tuple[int, ...]
+    states: frozenset[int]
     variant: Variant
 
     def at(self, k: Array) -> Any:
@@ -32,7 +32,7 @@ class Consider:
         if max(self.states) >= n:
             raise ValueError(f"states must be below {n}, their number; found {max(self.states)}")
         H, R = sensed(prior, moments)
-        rows = np.isin(np.arange(n), self.states)[:, None]
+        rows = np.isin(np.arange(n), list(self.states))[:, None]
         return prior, moments._replace(P_xz=xp.where(rows, 0.0, moments.P_xz), H=H, R=R)
 
 
@@ -70,7 +70,7 @@ def considering(estimator: Filter, states: Sequence[int]) -> Filter:
         raise TypeError(f"estimator must be a Filter; found {type(estimator).__name__}")
     if estimator.form != "joseph":
         raise ValueError(f"estimator must have form 'joseph'; found {estimator.form!r}")
-    numbers = tuple(validation.whole_number("states", i, 0) for i in states)
+    numbers = frozenset(validation.whole_number("states", i, 0) for i in states)
     if not numbers:
         raise ValueError("states must be at least one number; found none")
     return replace(estimator, variant=Consider(numbers, estimator.variant))
