@@ -19,7 +19,7 @@ class Rule:
     """Whether ``enlarge`` is given the innovation and the moments; they cost a call."""
 
     parts = False
-    """Whether ``noise_added`` is told the noise's part of P; it costs a second prediction."""
+    """Whether ``noise_added`` is told the noise's part of P."""
 
     def init(self, prior: Gaussian) -> Any:
         """The memory before any step."""
