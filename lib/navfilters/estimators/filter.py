@@ -17,7 +17,7 @@ from navfilters.estimators.correction import Correction, Observation, once
 from navfilters.estimators.limits import LIMITS
 from navfilters.estimators.moments import linearized
 from navfilters.estimators.options import accepted, keywords
-from navfilters.estimators.prediction import PREDICTIONS, predict_linearized
+from navfilters.estimators.prediction import PREDICTIONS, in_parts, predict_linearized
 from navfilters.estimators.rule import Rule
 from navfilters.estimators.state import FilterState, first_state, given_prior, keep, kept, missed
 from navfilters.estimators.update import FORMS, Form, absent, fit, innovation
@@ -176,9 +176,12 @@ class Filter:
         function = getattr(self.moments, "func", self.moments)
         predict = PREDICTIONS.get(function, predict_linearized)
         options = accepted(predict, getattr(self.moments, "keywords", {}))
-        return state._replace(
-            estimate=predict(state.estimate, dynamics, Q, **options), memory=memory
-        )
+        if self.rule is not None and self.rule.parts:
+            estimate, W = in_parts(predict, state.estimate, dynamics, Q, **options)
+            memory = self.rule.noise_added(memory, W)
+        else:
+            estimate = predict(state.estimate, dynamics, Q, **options)
+        return state._replace(estimate=estimate, memory=memory)
 
     def update(self, state: FilterState, z: Array, sensor: Any, k: Array = 0) -> FilterState:
         """The state after a measurement.

@@ -12,7 +12,7 @@ except ImportError as error:
 
 EKF, SECOND_ORDER, UKF, MEASUREMENT = "#D55E00", "#009E73", "#0072B2", "#E69F00"
 
-ROBUST, CORRECTED = "#CC79A7", "#882255"
+ROBUST, CORRECTED, LATER = "#CC79A7", "#882255", "#56B4E9"
 
 TRUTH, BOUND = "black", "0.55"
 
@@ -47,6 +47,14 @@ _VARIANTS = {
     "IPLF": (CORRECTED, "dotted", "^"),
     "RC-EKF": (CORRECTED, "dash-dot", "D"),
     "RC-UKF": (CORRECTED, "long dash", "v"),
+    "STF": (ROBUST, "dotted", "^"),
+    "gate": (ROBUST, "dash-dot", "D"),
+    "IMM": (LATER, "plain", "o"),
+    "VB": (LATER, "dashed", "s"),
+    "considered": (LATER, "dash-dot", "D"),
+    "converted": (LATER, "dotted", "^"),
+    "converted at mean": (LATER, "dash-dot-dot", "P"),
+    "polar": (LATER, "long dash", "v"),
 }
 
 STYLES: dict[str, dict[str, Any]] = {
