@@ -88,7 +88,7 @@ def test_levels_are_uniform_over_truths_and_data():
     """Truths from the prior, data from the truths: the levels of the truths are uniform."""
     rng = np.random.default_rng(1)
     prior = Gaussian(np.array([100.0, 100.0]), 900.0 * np.eye(2))
-    truth = rng.multivariate_normal(prior.mean, prior.cov, 800)
+    truth = rng.multivariate_normal(prior.mean, prior.cov, 400)
     z = np.stack([np.hypot(*truth.T), np.arctan2(truth[:, 1], truth[:, 0])], -1)
     z += rng.normal(size=z.shape) * np.sqrt(np.diag(R) / 3)
     exact = ExactPosterior(z, 3, R, prior, step=0.25)
