@@ -69,10 +69,23 @@ from navfilters.papers.pogorelsky2020.real_loop import (
     true_flight,
 )
 from navfilters.papers.pogorelsky2020.real_patches import MARGIN, Patch, cut_patches
+from navfilters.papers.pogorelsky2020.timed_images import (
+    TimedImages,
+    sweep_speed,
+    white_errors,
+    with_pointing_noise,
+)
 from navfilters.papers.pogorelsky2020.true_flight import Truth, initial_state, truth
+from navfilters.papers.pogorelsky2020.without_antenna import (
+    ARCSECOND,
+    Trial,
+    fly,
+    fly_with_offsets,
+)
 
 __all__ = [
     "ACQUIRING",
+    "ARCSECOND",
     "CASES",
     "CLIMBING",
     "FULL",
@@ -102,6 +115,8 @@ __all__ = [
     "Seen",
     "Setup",
     "SimulatedImages",
+    "TimedImages",
+    "Trial",
     "Truth",
     "acquire",
     "assumed_speeds",
@@ -112,6 +127,8 @@ __all__ = [
     "first_lines",
     "fitted",
     "flight_through",
+    "fly",
+    "fly_with_offsets",
     "image_table",
     "initial_state",
     "linearised_flight",
@@ -131,7 +148,10 @@ __all__ = [
     "same_images",
     "simulate_images",
     "summary",
+    "sweep_speed",
     "tabulate",
     "true_flight",
     "truth",
+    "white_errors",
+    "with_pointing_noise",
 ]
