@@ -97,6 +97,7 @@ def all_at_once(
     pointing: float = 0.0,
     untold: Any = (0.0, 0.0, 0.0, 0.0, 0.0),
     bias: Any = (0.0, 0.0, 0.0, 0.0, 0.0),
+    drift: Any = None,
 ) -> tuple[np.ndarray, float]:
     """Covariance at the end, and the expected NEES where the images err more than is said.
 
@@ -117,6 +118,8 @@ def all_at_once(
         Deviations of more white errors, which are not in the covariance.
     bias : array (5,)
         Errors that are the same in all images, and not in it either.
+    drift : array (k, 6), optional
+        Where the true flight is at each image, less where the filter's forces would have led it.
 
     Returns
     -------
@@ -140,11 +143,14 @@ def all_at_once(
         weight = np.linalg.solve(R, A).T
         information += weight @ A
         more += weight * np.square(untold)[rows] @ weight.T
-        pulled += weight @ np.asarray(bias, float)[rows]
+        wrong_rows = np.asarray(bias, float)
+        if drift is not None:
+            wrong_rows = wrong_rows + seen.H[:, :6] @ drift[k]
+        pulled += weight @ wrong_rows[rows]
     through = np.linalg.solve(information, B.T).T
-    P = B @ through.T
-    wrong = through @ (more + np.outer(pulled, pulled)) @ through.T
-    unit = np.sqrt(np.diag(P))
-    return P, 9 + float(
-        np.trace(np.linalg.solve(P / np.outer(unit, unit), wrong / np.outer(unit, unit)))
-    )
+    P, away = B @ through.T, through @ pulled
+    if drift is not None:
+        away[:6] -= drift[-1]
+    wrong, unit = through @ more @ through.T + np.outer(away, away), np.sqrt(np.diag(P))
+    scale = np.outer(unit, unit)
+    return P, 9 + float(np.trace(np.linalg.solve(P / scale, wrong / scale)))

@@ -1,6 +1,7 @@
 """Pogorelsky et al. (2020): navigation by SAR images of known terrain."""
 
 from navfilters.papers.pogorelsky2020.acquisition import acquire, measure_directly
+from navfilters.papers.pogorelsky2020.antenna_tables import antenna_table
 from navfilters.papers.pogorelsky2020.campaign import (
     ACQUIRING,
     CLIMBING,
@@ -119,6 +120,7 @@ __all__ = [
     "Trial",
     "Truth",
     "acquire",
+    "antenna_table",
     "assumed_speeds",
     "campaign_report",
     "closed_table",

@@ -28,7 +28,8 @@ from navfilters.space.zero_doppler import ZeroDoppler
 from navfilters.types import Array, Gaussian
 
 ARCSECOND = np.deg2rad(1 / 3600)
-MEASURED = ("antenna", "plane", "both")
+Measured = Literal["antenna", "plane", "both"]
+MEASURED: tuple[Measured, ...] = ("antenna", "plane", "both")
 OFFSETS = {"azimuth": 2, "delay": 3}
 """Which of an image's five numbers is measured with which constant error."""
 
@@ -58,7 +59,7 @@ class Trial:
         Another measurement.
     """
 
-    measured: Literal["antenna", "plane", "both"] = "plane"
+    measured: Measured = "plane"
     clock: float = 1e-4
     late: float = 0.0
     pointing: float = 0.0
@@ -74,7 +75,7 @@ def fly(
     case: str | Setup,
     trials: Sequence[Trial],
     updates: int = 72,
-    runs: int = 200,
+    runs: int | Sequence[int] = 200,
     seed: int = 0,
     *,
     flight: Truth | None = None,
@@ -99,7 +100,7 @@ def fly(
     found = monte_carlo(
         setup,
         updates,
-        list(range(runs)) * len(trials),
+        _which(runs) * len(trials),
         seed,
         flight=flight,
         measure=_images(setup, trials, runs, seed, flight),
@@ -115,7 +116,7 @@ def fly_with_offsets(
     case: str | Setup,
     trials: Sequence[Trial],
     sigma: dict[str, Array],
-    runs: int = 200,
+    runs: int | Sequence[int] = 200,
     seed: int = 0,
     *,
     estimator: Any = None,
@@ -153,10 +154,11 @@ def fly_with_offsets(
         "delay": _of(trials, "delay", runs),
     }
     images = _images(setup, trials, runs, seed, flight)
-    spread = [np.repeat(np.broadcast_to(sigma[name], count), runs) for name in sigma]
+    size = len(_which(runs))
+    spread = [np.repeat(np.broadcast_to(sigma[name], count), size) for name in sigma]
     first = first_estimate(setup, images.images.true_state(0), images.images.noise.first)
     m = len(sigma)
-    P = np.zeros((count * runs, 9 + m, 9 + m))
+    P = np.zeros((count * size, 9 + m, 9 + m))
     P[:, :9, :9] = first.cov
     for i, deviation in enumerate(spread):
         P[:, 9 + i, 9 + i] = deviation**2
@@ -166,7 +168,7 @@ def fly_with_offsets(
 
     found = run(
         setup.mekf if estimator is None else estimator,
-        Gaussian(np.concatenate([first.mean, np.zeros((count * runs, m))], axis=-1), P),
+        Gaussian(np.concatenate([first.mean, np.zeros((count * size, m))], axis=-1), P),
         image,
         offsets.OffsetImages(
             _sensor(setup, trials, runs, flight), tuple(OFFSETS[name] for name in sigma)
@@ -185,9 +187,13 @@ def fly_with_offsets(
     return _by_trial(errors, count), _by_trial(found.cov, count)
 
 
-def _of(trials: Sequence[Trial], name: str, runs: int) -> Array:
+def _which(runs: int | Sequence[int]) -> list[int]:
+    return list(range(runs)) if isinstance(runs, int) else list(runs)
+
+
+def _of(trials: Sequence[Trial], name: str, runs: int | Sequence[int]) -> Array:
     """A field of the trials, for each run, (trials * runs,)."""
-    return np.repeat([getattr(trial, name) for trial in trials], runs)
+    return np.repeat([getattr(trial, name) for trial in trials], len(_which(runs)))
 
 
 def _by_trial(part: Array, count: int) -> Array:
@@ -195,9 +201,13 @@ def _by_trial(part: Array, count: int) -> Array:
 
 
 def _images(
-    setup: Setup, trials: Sequence[Trial], runs: int, seed: int, flight: Truth
+    setup: Setup,
+    trials: Sequence[Trial],
+    runs: int | Sequence[int],
+    seed: int,
+    flight: Truth,
 ) -> TimedImages:
-    which, intervals = list(range(runs)) * len(trials), len(flight.times) - 1
+    which, intervals = _which(runs) * len(trials), len(flight.times) - 1
     white = white_errors(which, intervals, 4, seed)
     images = simulate_images(setup, which, seed, flight=flight)
     images = with_pointing_noise(
@@ -214,7 +224,9 @@ def _images(
     )
 
 
-def _sensor(setup: Setup, trials: Sequence[Trial], runs: int, flight: Truth) -> ZeroDoppler:
+def _sensor(
+    setup: Setup, trials: Sequence[Trial], runs: int | Sequence[int], flight: Truth
+) -> ZeroDoppler:
     return ZeroDoppler(
         SarPass(setup.geometry, flight.T_e_b[1:]),
         sweep_speed(setup, flight).mean() * _of(trials, "clock", runs),
