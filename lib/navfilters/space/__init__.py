@@ -31,6 +31,7 @@ from navfilters.space.quaternions import (
 )
 from navfilters.space.star_earth_sensor import StarEarthSensor
 from navfilters.space.thrust import COASTING, Thrust
+from navfilters.space.zero_doppler import TimedMeasurement, ZeroDoppler
 
 __all__ = [
     "COASTING",
@@ -50,6 +51,8 @@ __all__ = [
     "SarPass",
     "StarEarthSensor",
     "Thrust",
+    "TimedMeasurement",
+    "ZeroDoppler",
     "antenna_axes",
     "body_axes",
     "conjugate",

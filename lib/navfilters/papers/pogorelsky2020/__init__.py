@@ -1,6 +1,7 @@
 """Pogorelsky et al. (2020): navigation by SAR images of known terrain."""
 
 from navfilters.papers.pogorelsky2020.acquisition import acquire, measure_directly
+from navfilters.papers.pogorelsky2020.antenna_tables import antenna_table
 from navfilters.papers.pogorelsky2020.campaign import (
     ACQUIRING,
     CLIMBING,
@@ -69,10 +70,23 @@ from navfilters.papers.pogorelsky2020.real_loop import (
     true_flight,
 )
 from navfilters.papers.pogorelsky2020.real_patches import MARGIN, Patch, cut_patches
+from navfilters.papers.pogorelsky2020.timed_images import (
+    TimedImages,
+    sweep_speed,
+    white_errors,
+    with_pointing_noise,
+)
 from navfilters.papers.pogorelsky2020.true_flight import Truth, initial_state, truth
+from navfilters.papers.pogorelsky2020.without_antenna import (
+    ARCSECOND,
+    Trial,
+    fly,
+    fly_with_offsets,
+)
 
 __all__ = [
     "ACQUIRING",
+    "ARCSECOND",
     "CASES",
     "CLIMBING",
     "FULL",
@@ -102,8 +116,11 @@ __all__ = [
     "Seen",
     "Setup",
     "SimulatedImages",
+    "TimedImages",
+    "Trial",
     "Truth",
     "acquire",
+    "antenna_table",
     "assumed_speeds",
     "campaign_report",
     "closed_table",
@@ -112,6 +129,8 @@ __all__ = [
     "first_lines",
     "fitted",
     "flight_through",
+    "fly",
+    "fly_with_offsets",
     "image_table",
     "initial_state",
     "linearised_flight",
@@ -131,7 +150,10 @@ __all__ = [
     "same_images",
     "simulate_images",
     "summary",
+    "sweep_speed",
     "tabulate",
     "true_flight",
     "truth",
+    "white_errors",
+    "with_pointing_noise",
 ]
