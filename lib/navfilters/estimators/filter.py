@@ -185,9 +185,12 @@ class Filter:
         function = getattr(self.moments, "func", self.moments)
         predict = PREDICTIONS.get(function, predict_linearized)
         options = accepted(predict, getattr(self.moments, "keywords", {}))
-        return state._replace(
-            estimate=predict(state.estimate, dynamics, Q, **options), memory=memory
-        )
+        estimate = predict(state.estimate, dynamics, Q, **options)
+        if self.rule is not None and self.rule.parts:
+            certain = state.estimate._replace(cov=0 * state.estimate.cov)
+            W = predict(certain, dynamics, Q, **options).cov
+            memory = self.rule.noise_added(memory, W)
+        return state._replace(estimate=estimate, memory=memory)
 
     def update(self, state: FilterState, z: Array, sensor: Any, k: Array = 0) -> FilterState:
         """The state after a measurement.
