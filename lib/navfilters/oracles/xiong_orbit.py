@@ -216,3 +216,17 @@ def adaptive(alpha, rho):
         return factor[:, None, None] * P, V
 
     return rule
+
+
+def robust(weights):
+    """The REKF's (5) with a weight gamma^-2 for each component, where P allows it."""
+
+    def rule(memory, y, H, P, R, W):
+        out = P.copy()
+        for i in range(len(P)):
+            root = np.sqrt(weights)
+            if np.linalg.eigvalsh(root[:, None] * P[i] * root)[-1] < 1:
+                out[i] = np.linalg.inv(np.linalg.inv(P[i]) - np.diag(weights))
+        return out, None
+
+    return rule

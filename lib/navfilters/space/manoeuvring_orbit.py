@@ -56,8 +56,8 @@ class ManoeuvringOrbit:
     Notes
     -----
     :class:`~navfilters.space.inertial_orbit.Orbit` does the same for n = 6 second by second. Here a
-    sub-step is longer, and the noise of its seconds is summed up along a straight path: at 20 s in
-    a low orbit W is right to a thousandth, and the state to a millimetre.
+    sub-step is longer, and the noise of its seconds is summed up along a straight path: at 25 s in
+    a low orbit W is right to a thousandth, and the state to 3 mm.
     """
 
     Q: Array
@@ -66,7 +66,7 @@ class ManoeuvringOrbit:
     thrust: Literal["none", "strength", "vector"] = "none"
     memory: float = np.inf
     gravity: Gravity = EARTH
-    step: int = 20
+    step: int = 25
     interval: int = 100
     start: float = 0.0
 
@@ -208,9 +208,7 @@ def manoeuvring(
     Q = E[:, :6] @ orbit.Q @ E[:6]
     Q_arcs = of_v * (E[:, 3:6] @ E[3:6]) + of_a * (E[:, 6:] @ E[6:])
     Q, Q_arcs = np.broadcast_arrays(Q, Q_arcs)
-    return ManoeuvringOrbit(
-        Q, Q_arcs, arcs, thrust, memory, orbit.gravity, interval=orbit.substeps
-    )
+    return ManoeuvringOrbit(Q, Q_arcs, arcs, thrust, memory, orbit.gravity, interval=orbit.substeps)
 
 
 def _middle(x: Array, x_next: Array, h: float) -> Array:

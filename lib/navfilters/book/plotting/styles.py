@@ -14,6 +14,8 @@ EKF, SECOND_ORDER, UKF, MEASUREMENT = "#D55E00", "#009E73", "#0072B2", "#E69F00"
 
 ROBUST = "#CC79A7"
 
+TOLD, MIXED, FADING = "#56B4E9", "#7F5A2A", "#882255"
+
 TRUTH, BOUND = "black", "0.55"
 
 _DASHES: dict[str, Any] = {
@@ -39,6 +41,16 @@ _VARIANTS = {
     "REKF": (ROBUST, "plain", "o"),
     "AEKF": (ROBUST, "dashed", "s"),
     "AREKF": (ROBUST, "dash-dot-dot", "P"),
+    "AREKF, tuned": (ROBUST, "dash-dot", "X"),
+    "gate": (ROBUST, "dotted", "^"),
+    "strong tracking": (FADING, "plain", "v"),
+    "strong tracking, softened": (FADING, "dashed", "D"),
+    "constant Q": (MIXED, "plain", "s"),
+    "thrust as state": (MIXED, "dashed", "D"),
+    "IMM": (MIXED, "dotted", "^"),
+    "timed Q": (TOLD, "plain", "s"),
+    "timed thrust vector": (TOLD, "dashed", "D"),
+    "timed strength": (TOLD, "dash-dot", "*"),
 }
 
 STYLES: dict[str, dict[str, Any]] = {
