@@ -14,6 +14,8 @@ EKF, SECOND_ORDER, UKF, MEASUREMENT = "#D55E00", "#009E73", "#0072B2", "#E69F00"
 
 ROBUST, CORRECTED, LATER = "#CC79A7", "#882255", "#56B4E9"
 
+TOLD, MIXED, FADING = "#332288", "#7F5A2A", "#AA4499"
+
 TRUTH, BOUND = "black", "0.55"
 
 _DASHES: dict[str, Any] = {
@@ -55,6 +57,14 @@ _VARIANTS = {
     "converted": (LATER, "dotted", "^"),
     "converted at mean": (LATER, "dash-dot-dot", "P"),
     "polar": (LATER, "long dash", "v"),
+    "AREKF, tuned": (ROBUST, "long dash", "X"),
+    "strong tracking": (ROBUST, "dotted", "^"),
+    "strong tracking, softened": (FADING, "dashed", "D"),
+    "constant Q": (MIXED, "plain", "s"),
+    "thrust as state": (MIXED, "dashed", "D"),
+    "timed Q": (TOLD, "plain", "s"),
+    "timed thrust vector": (TOLD, "dashed", "D"),
+    "timed strength": (TOLD, "dash-dot", "*"),
 }
 
 STYLES: dict[str, dict[str, Any]] = {
