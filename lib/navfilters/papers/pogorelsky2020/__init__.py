@@ -18,6 +18,7 @@ from navfilters.papers.pogorelsky2020.closed_loop import (
     monte_carlo_closed,
     summary,
 )
+from navfilters.papers.pogorelsky2020.different_images import DifferentImages
 from navfilters.papers.pogorelsky2020.experiment import (
     CASES,
     NOMINAL,
@@ -26,6 +27,15 @@ from navfilters.papers.pogorelsky2020.experiment import (
     of_case,
 )
 from navfilters.papers.pogorelsky2020.final_nees import final_nees, nees_line
+from navfilters.papers.pogorelsky2020.image_blocks import (
+    BlockCurves,
+    BlockMatches,
+    BlockPlace,
+    block_curves,
+    block_tables,
+    cut_blocks,
+    match_blocks,
+)
 from navfilters.papers.pogorelsky2020.image_tables import (
     ImageTable,
     assumed_speeds,
@@ -86,7 +96,11 @@ __all__ = [
     "Agreement",
     "Altered",
     "Attempt",
+    "BlockCurves",
+    "BlockMatches",
+    "BlockPlace",
     "Campaign",
+    "DifferentImages",
     "Folder",
     "Formed",
     "ImageTable",
@@ -105,8 +119,11 @@ __all__ = [
     "Truth",
     "acquire",
     "assumed_speeds",
+    "block_curves",
+    "block_tables",
     "campaign_report",
     "closed_table",
+    "cut_blocks",
     "cut_patches",
     "final_nees",
     "first_lines",
@@ -116,6 +133,7 @@ __all__ = [
     "initial_state",
     "linearised_flight",
     "lines_between",
+    "match_blocks",
     "measure_directly",
     "misalignment",
     "monte_carlo",
