@@ -19,6 +19,7 @@ from navfilters.papers.pogorelsky2020.closed_loop import (
     monte_carlo_closed,
     summary,
 )
+from navfilters.papers.pogorelsky2020.different_images import DifferentImages
 from navfilters.papers.pogorelsky2020.experiment import (
     CASES,
     NOMINAL,
@@ -27,6 +28,15 @@ from navfilters.papers.pogorelsky2020.experiment import (
     of_case,
 )
 from navfilters.papers.pogorelsky2020.final_nees import final_nees, nees_line
+from navfilters.papers.pogorelsky2020.image_blocks import (
+    BlockCurves,
+    BlockMatches,
+    BlockPlace,
+    block_curves,
+    block_tables,
+    cut_blocks,
+    match_blocks,
+)
 from navfilters.papers.pogorelsky2020.image_tables import (
     ImageTable,
     assumed_speeds,
@@ -100,7 +110,11 @@ __all__ = [
     "Agreement",
     "Altered",
     "Attempt",
+    "BlockCurves",
+    "BlockMatches",
+    "BlockPlace",
     "Campaign",
+    "DifferentImages",
     "Folder",
     "Formed",
     "ImageTable",
@@ -122,8 +136,11 @@ __all__ = [
     "acquire",
     "antenna_table",
     "assumed_speeds",
+    "block_curves",
+    "block_tables",
     "campaign_report",
     "closed_table",
+    "cut_blocks",
     "cut_patches",
     "final_nees",
     "first_lines",
@@ -135,6 +152,7 @@ __all__ = [
     "initial_state",
     "linearised_flight",
     "lines_between",
+    "match_blocks",
     "measure_directly",
     "misalignment",
     "monte_carlo",
