@@ -80,8 +80,8 @@ def sky(epoch: datetime, duration: float) -> Sky:
     from astropy.utils import iers
 
     t = np.arange(-STEP, duration + 2 * STEP, STEP)
-    offline = iers.conf.set_temp("auto_download", False)
-    with offline, iers.conf.set_temp("auto_max_age", None):
+    # The final values of the Earth's orientation, which come with astropy: nothing is downloaded.
+    with iers.earth_orientation_table.set(iers.IERS_B.open()):
         time = Time(epoch, scale="utc") + t * u.s
         columns = []
         for axis in np.eye(3):
