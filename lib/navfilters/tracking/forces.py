@@ -60,7 +60,7 @@ def density(height: Array) -> Array:
     array (...)
     """
     row = np.searchsorted(_TABLE[1:, 0], np.real(height) / 1e3, side="right")
-    base, rho, scale = _TABLE[row].T if row.ndim else _TABLE[row]
+    base, rho, scale = np.moveaxis(_TABLE[row], -1, 0)
     return rho * np.exp((base - height / 1e3) / scale)
 
 
