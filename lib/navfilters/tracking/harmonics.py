@@ -71,7 +71,9 @@ class Harmonics:
         distance = np.sqrt(dot(r, r))[..., None]
         unit = r / distance
         N, ratio = self.degree + 1, self.radius / distance
-        products = ratio[..., None] ** np.arange(N)[:, None] * unit[..., 2:, None] ** np.arange(N + 1)
+        products = ratio[..., None] ** np.arange(N)[:, None] * unit[..., 2:, None] ** np.arange(
+            N + 1
+        )
         sums = products.reshape(*r.shape[:-1], N * (N + 1)) @ self._table
         of_C, of_S, of_Cu, of_Su, of_Cr, of_Sr = np.moveaxis(
             sums.reshape(*r.shape[:-1], 6, N), -2, 0

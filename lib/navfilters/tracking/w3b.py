@@ -26,6 +26,9 @@ MASS = 5370.0
 """kg; the settings file has it in a comment."""
 
 
+ANGLES = ("azimuth", "elevation")
+
+
 @dataclass(frozen=True, eq=False)
 class Flight:
     """What the files say.
@@ -48,6 +51,21 @@ class Flight:
     problem: OrbitProblem
     start: np.ndarray
     to_mean_equator: np.ndarray
+
+
+def earth_field(degree: int) -> Harmonics:
+    """EGM96.
+
+    Parameters
+    ----------
+    degree : int
+        The last, with all orders; the file goes to 21.
+
+    Returns
+    -------
+    Harmonics
+    """
+    return Harmonics(*read_coefficients(FOLDER / "EGM96-truncated-21x21", degree))
 
 
 def flight(degree: int = 8) -> Flight:
@@ -73,7 +91,9 @@ def flight(degree: int = 8) -> Flight:
     settings = read_settings(FOLDER / "od_test_W3.in")
     epoch = settings.date("orbit.date")
     station = "ground.station."
-    names = tuple(settings.text(station + "name", i) for i in range(settings.count(station + "name")))
+    names = tuple(
+        settings.text(station + "name", i) for i in range(settings.count(station + "name"))
+    )
     observations = read_observations(FOLDER / "W3B.aer", names, epoch)
     places = np.stack(
         [
@@ -84,12 +104,11 @@ def flight(degree: int = 8) -> Flight:
         axis=-1,
     )
     above = sky(epoch, observations.time[-1])
-    gravity = Harmonics(*read_coefficients(FOLDER / "EGM96-truncated-21x21", degree))
     light = settings.number("solar.radiation.pressure.cr") * settings.number(
         "solar.radiation.pressure.area"
     )
     problem = OrbitProblem(
-        Forces(gravity, above, radiation=light / MASS),
+        Forces(earth_field(degree), above, radiation=light / MASS),
         observations,
         sites(places, observations.station, observations.time, above),
         np.array(
@@ -101,13 +120,12 @@ def flight(degree: int = 8) -> Flight:
     )
     to_mean_equator = erfa.bp06(2451545.0, 0.0)[0]
     start = np.zeros(problem.size)
-    start[:6] = [settings.number(f"orbit.cartesian.{c}") for c in ("px", "py", "pz", "vx", "vy", "vz")]
+    start[:6] = [
+        settings.number(f"orbit.cartesian.{c}") for c in ("px", "py", "pz", "vx", "vy", "vz")
+    ]
     start[:6] = (start[:6].reshape(2, 3) @ to_mean_equator).ravel()
     start[6] = settings.number("drag.cd") * settings.number("drag.area") / MASS
     biases = [settings.numbers(station + "range.bias") + settings.number("onboard.range.bias")]
     biases += [np.radians(settings.numbers(station + f"{angle}.bias")) for angle in ANGLES]
     start[MOTION:] = np.stack(biases, axis=-1).ravel()
     return Flight(settings, observations, problem, start, to_mean_equator)
-
-
-ANGLES = ("azimuth", "elevation")
