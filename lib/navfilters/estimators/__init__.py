@@ -3,7 +3,11 @@
 from navfilters.estimators.adaptive import AdaptiveNoise
 from navfilters.estimators.any_filter import as_filter
 from navfilters.estimators.catalogue import FILTERS
+from navfilters.estimators.consider import considering
+from navfilters.estimators.converted import expecting_noise
 from navfilters.estimators.filter import Filter
+from navfilters.estimators.gated_inflation import GatedInflation
+from navfilters.estimators.interacting import InteractingModels, Modes
 from navfilters.estimators.moments import (
     linearized,
     second_order,
@@ -14,6 +18,7 @@ from navfilters.estimators.robust import AdaptiveRobust, Robust, trace_ratio
 from navfilters.estimators.rule import Rule
 from navfilters.estimators.sigma_points import SigmaPoints, sigma_points
 from navfilters.estimators.state import FilterState
+from navfilters.estimators.strong_tracking import StrongTracking
 from navfilters.estimators.update import kalman_update
 from navfilters.estimators.variants import (
     bump_circular,
@@ -24,6 +29,7 @@ from navfilters.estimators.variants import (
     expect_at_mean,
     unchanged,
 )
+from navfilters.estimators.variational_noise import VariationalNoise
 
 __all__ = [
     "FILTERS",
@@ -31,16 +37,23 @@ __all__ = [
     "AdaptiveRobust",
     "Filter",
     "FilterState",
+    "GatedInflation",
+    "InteractingModels",
+    "Modes",
     "Robust",
     "Rule",
     "SigmaPoints",
+    "StrongTracking",
+    "VariationalNoise",
     "as_filter",
     "bump_circular",
     "bump_equivalent",
     "bump_linear",
     "bump_predicted",
     "bump_state",
+    "considering",
     "expect_at_mean",
+    "expecting_noise",
     "kalman_update",
     "linearized",
     "second_order",

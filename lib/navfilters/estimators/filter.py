@@ -17,6 +17,7 @@ from navfilters.estimators.limits import LIMITS
 from navfilters.estimators.moments import linearized, second_order, unscented
 from navfilters.estimators.options import accepted, keywords
 from navfilters.estimators.prediction import (
+    in_parts,
     predict_linearized,
     predict_second_order,
     predict_unscented,
@@ -185,9 +186,12 @@ class Filter:
         function = getattr(self.moments, "func", self.moments)
         predict = PREDICTIONS.get(function, predict_linearized)
         options = accepted(predict, getattr(self.moments, "keywords", {}))
-        return state._replace(
-            estimate=predict(state.estimate, dynamics, Q, **options), memory=memory
-        )
+        if self.rule is not None and self.rule.parts:
+            estimate, W = in_parts(predict, state.estimate, dynamics, Q, **options)
+            memory = self.rule.noise_added(memory, W)
+        else:
+            estimate = predict(state.estimate, dynamics, Q, **options)
+        return state._replace(estimate=estimate, memory=memory)
 
     def update(self, state: FilterState, z: Array, sensor: Any, k: Array = 0) -> FilterState:
         """The state after a measurement.

@@ -1,5 +1,7 @@
 """How a filter predicts its state: the approximation of its moments, with f in the place of h."""
 
+from collections.abc import Callable
+
 from navfilters.estimators.model_parts import by_error, difference, moved, retract, transition
 from navfilters.estimators.sigma_points import SigmaPoints, behind, offsets, root_of
 from navfilters.numerics.small_matrices import outer_sum
@@ -100,3 +102,32 @@ def predict_unscented(
     W0_c, W_i = W0_c[..., None, None], W_i[..., None, None]
     P = W + W0_c * outer_sum(dY[:1], dY[:1]) + W_i * outer_sum(dY[1:], dY[1:])
     return Gaussian(mean, (P + P.mT) / 2)
+
+
+def in_parts(
+    predict: Callable[..., Gaussian], estimate: Gaussian, dynamics: Dynamics, Q: Array, **options
+) -> tuple[Gaussian, Array]:
+    """A prediction, and what the noise added to its covariance.
+
+    Parameters
+    ----------
+    predict : callable
+        One of those above.
+    estimate : Gaussian
+    dynamics : Dynamics
+    Q : array (..., n, n)
+    **options
+        Of ``predict``.
+
+    Returns
+    -------
+    tuple of Gaussian, array (..., n, n)
+        The second is the covariance of the same prediction of a state without doubt, which is made
+        along with it: f is not called again.
+    """
+    mean, cov = estimate
+    axes = max(mean.ndim + 1, cov.ndim, Q.ndim)
+    cov = cov[(None,) * (axes + 1 - cov.ndim)]
+    both = cov.__array_namespace__().concat([cov, 0 * cov])
+    mean, cov = predict(Gaussian(mean[(None,) * (axes - mean.ndim)], both), dynamics, Q, **options)
+    return Gaussian(mean[0], cov[0]), cov[1]

@@ -71,15 +71,15 @@ def read_observations(path: Path, stations: tuple[str, ...], epoch: datetime) ->
         if words[2] not in stations:
             raise ValueError(f"{where}: a station of {list(stations)} is needed; found {words[2]}")
         z = np.full(3, np.nan)
-        values = [_number(word, where) for word in words[3:]]
-        z[list(components)] = np.multiply(values, 1e3) if kind == "RANGE" else np.radians(values)
+        given = [_number(word, where) for word in words[3:]]
+        z[list(components)] = np.multiply(given, 1e3) if kind == "RANGE" else np.radians(given)
         time = (_date(words[0], where) - epoch).total_seconds()
         rows.append((time, stations.index(words[2]), z))
     if not rows:
         raise ValueError(f"{path}: at least one measurement is needed; found none")
     rows.sort(key=lambda row: row[0])
-    time, station, z = map(np.array, zip(*rows, strict=True))
-    return Observations(time, station, z, tuple(stations))
+    times, numbers, values = map(np.array, zip(*rows, strict=True))
+    return Observations(times, numbers, values, tuple(stations))
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navfilters.numerics.analytic import atan2, dot, hypot
+from navfilters.numerics.analytic import atan2, dot
 from navfilters.tracking.sky import OMEGA, Sky, geodetic
 from navfilters.types import Array
 

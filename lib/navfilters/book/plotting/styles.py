@@ -12,7 +12,7 @@ except ImportError as error:
 
 EKF, SECOND_ORDER, UKF, MEASUREMENT = "#D55E00", "#009E73", "#0072B2", "#E69F00"
 
-ROBUST = "#CC79A7"
+ROBUST, LATER = "#CC79A7", "#56B4E9"
 
 TRUTH, BOUND = "black", "0.55"
 
@@ -39,6 +39,14 @@ _VARIANTS = {
     "REKF": (ROBUST, "plain", "o"),
     "AEKF": (ROBUST, "dashed", "s"),
     "AREKF": (ROBUST, "dash-dot-dot", "P"),
+    "STF": (ROBUST, "dotted", "^"),
+    "gate": (ROBUST, "dash-dot", "D"),
+    "IMM": (LATER, "plain", "o"),
+    "VB": (LATER, "dashed", "s"),
+    "considered": (LATER, "dash-dot", "D"),
+    "converted": (LATER, "dotted", "^"),
+    "converted at mean": (LATER, "dash-dot-dot", "P"),
+    "polar": (LATER, "long dash", "v"),
 }
 
 STYLES: dict[str, dict[str, Any]] = {
