@@ -73,6 +73,18 @@ STYLES: dict[str, dict[str, Any]] = {
 }
 """Matplotlib keywords of each filter."""
 
+STATIONS: dict[str, dict[str, Any]] = {
+    name: {"color": color, "marker": marker, "markersize": 3.5, "linestyle": "none"}
+    for name, color, marker in (
+        ("Uralla", "#0072B2", "o"),
+        ("Kumsan", "#D55E00", "^"),
+        ("Pretoria", "#009E73", "s"),
+        ("Fucino", "#CC79A7", "x"),
+        ("CastleRock", "black", "+"),
+    )
+}
+"""Matplotlib keywords of each ground station."""
+
 
 def use_style() -> None:
     """Set Matplotlib's defaults for this book; called once, at the top of a chapter."""
