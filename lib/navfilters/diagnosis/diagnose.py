@@ -1,0 +1,300 @@
+"""Whether the innovations of one run are what the filter says that they are."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from navfilters.diagnosis.log_file import Log
+from navfilters.numerics import validation
+from navfilters.runs.chi_square import tail_of
+from navfilters.runs.consistency import nees
+from navfilters.types import Array
+
+LAGS = 10
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One component of the innovations, each over the deviation that the filter gave it.
+
+    Parameters
+    ----------
+    number : int
+        From 1.
+    count : int
+        How often it was measured.
+    bias : float
+        Mean, in deviations: 0 if the filter is right.
+    scale : float
+        Mean square: the factor on its variance in S that would make it right.
+    low, high : float
+        Confidence interval of ``scale``, if the innovations are white and Gaussian.
+    within : tuple of float
+        Shares within one, two and three deviations: 0.683, 0.954, 0.997 if the filter is right.
+    correlation : float
+        Of the whitened innovation with the one before: 0 if the filter is right.
+    biased, coloured : bool
+        What was found at the stated confidence.
+    """
+
+    number: int
+    count: int
+    bias: float
+    scale: float
+    low: float
+    high: float
+    within: tuple[float, float, float]
+    correlation: float
+    biased: bool
+    coloured: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What was found in a log.
+
+    Parameters
+    ----------
+    time : array (k,)
+        Of each update.
+    nis : array (k,)
+        Normalised innovation squared; NaN where nothing was measured.
+    dof : int array (k,)
+        How many components were measured: what the NIS is on the average, if the filter is right.
+    ratio, low, high : float
+        Sum of the NIS over the sum of ``dof``, and the band of a filter that is right.
+    windows : array (w, 4)
+        First and last time of each window, its ratio over the ends of its band: below 1 and above
+        1, in that order, where it is inside.
+    stopped : float, optional
+        First time of the first window outside its band.
+    channels : tuple of Channel
+    indefinite : int
+        Updates whose S is not positive definite.
+    nees : array (k,), optional
+        Normalised error squared, where a truth is known.
+    nees_ratio, nees_low, nees_high : float, optional
+        Its mean over n, and the band; the errors of one run are correlated in time, for which the
+        band is widened.
+    confidence : float
+        Of all findings together.
+    findings : tuple of str
+        What is wrong, in words; empty for a filter that may be right.
+    """
+
+    time: Array
+    nis: Array
+    dof: Array
+    ratio: float
+    low: float
+    high: float
+    windows: Array
+    stopped: float | None
+    channels: tuple[Channel, ...]
+    indefinite: int
+    confidence: float
+    nees: Array | None = None
+    nees_ratio: float | None = None
+    nees_low: float | None = None
+    nees_high: float | None = None
+    findings: tuple[str, ...] = ()
+
+    @property
+    def consistent(self) -> bool:
+        """Whether nothing was found."""
+        return not self.findings
+
+    def summary(self) -> dict[str, Any]:
+        """Numbers and findings without the series, for JSON."""
+        kept = ("ratio", "low", "high", "stopped", "indefinite", "confidence")
+        numbers = {name: getattr(self, name) for name in kept}
+        numbers |= {n: getattr(self, n) for n in ("nees_ratio", "nees_low", "nees_high")}
+        channels = [asdict(c) for c in self.channels]
+        return numbers | {"channels": channels, "findings": list(self.findings)}
+
+
+def diagnose(
+    log: Log,
+    *,
+    angles: Mapping[int, float] | None = None,
+    window: int = 50,
+    confidence: float = 0.95,
+) -> Diagnosis:
+    """Test the innovations of a log, and its errors where a truth is known.
+
+    Parameters
+    ----------
+    log : Log
+    angles : mapping of int to float, optional
+        Channels (from 1) that wrap, with their period: {2: 2 * pi}.
+    window : int
+        Updates in a window, at least 10.
+    confidence : float
+        Probability that a filter that is right passes all tests together.
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    ValueError
+        An unknown channel, a period that is not positive, a window below 10, a confidence not
+        between 0 and 1, a log without a measurement.
+
+    References
+    ----------
+    Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation, 5.4.
+    """
+    rest = 2 * tail_of(confidence)
+    validation.whole_number("window", window, 10)
+    y = _wrapped(log.innovation, angles or {})
+    white, nis, dof, indefinite = _whitened(y, log.S)
+    good = np.isfinite(nis)
+    if not good.any():
+        raise ValueError("log must hold at least one innovation with a definite S; found none")
+    m = y.shape[1]
+    tests = 2 + 2 * m + (log.error is not None)
+    tail = rest / tests / 2
+    from scipy import stats
+
+    total = int(dof[good].sum())
+    ratio = float(nis[good].sum() / total)
+    low, high = (float(stats.chi2.ppf(p, total) / total) for p in (tail, 1 - tail))
+    windows, stopped = _windows(log.time[good], nis[good], dof[good], window, 2 * tail)
+    channels = tuple(_channel(i, y[:, i], log.S[:, i, i], white[:, i], tail) for i in range(m))
+    found = Diagnosis(
+        log.time, nis, dof, ratio, low, high, windows, stopped, channels, indefinite, confidence
+    )
+    extra = {} if log.error is None else _errors(log, tail)
+    found = Diagnosis(**{**found.__dict__, **extra})
+    return Diagnosis(**{**found.__dict__, "findings": tuple(_findings(found))})
+
+
+def _wrapped(y: Array, angles: Mapping[int, float]) -> Array:
+    y = y.copy()
+    for channel, period in angles.items():
+        if not 1 <= channel <= y.shape[1]:
+            raise ValueError(f"angles must name channels 1 to {y.shape[1]}; found {channel}")
+        if not 0 < period < np.inf:
+            raise ValueError(f"angles must have positive periods; found {period}")
+        y[:, channel - 1] -= period * np.ceil(y[:, channel - 1] / period - 0.5)
+    return y
+
+
+def _whitened(y: Array, S: Array) -> tuple[Array, Array, Array, int]:
+    """L^-1 y of what was measured, its square, how many components, and how many S had no L."""
+    measured = np.isfinite(y)
+    white = np.full(y.shape, np.nan)
+    bad = np.zeros(len(y), bool)
+    for pattern in np.unique(measured, axis=0):
+        if not pattern.any():
+            continue
+        rows = np.flatnonzero((measured == pattern).all(axis=1))
+        part = S[np.ix_(rows, pattern, pattern)]
+        sound = np.isfinite(part).all((1, 2))
+        sound[sound] = np.linalg.eigvalsh(part[sound])[:, 0] > 0
+        bad[rows[~sound]] = True
+        L = np.linalg.cholesky(part[sound])
+        u = np.linalg.solve(L, y[np.ix_(rows[sound], pattern)][..., None])[..., 0]
+        white[np.ix_(rows[sound], pattern)] = u
+    dof = np.where(bad, 0, measured.sum(axis=1))
+    nis = np.where(dof > 0, np.nansum(white**2, axis=1), np.nan)
+    return white, nis, dof, int(bad.sum())
+
+
+def _windows(time: Array, nis: Array, dof: Array, size: int, alpha: float):
+    """Ratio of every window beside its band, and the first time of the first one outside."""
+    from scipy import stats
+
+    starts = range(0, max(1, len(nis) - size // 2), size)
+    rows, stopped = [], None
+    for begin in starts:
+        last = len(nis) if begin + size + size // 2 > len(nis) else begin + size
+        total = dof[begin:last].sum()
+        ratio = nis[begin:last].sum() / total
+        ends = [stats.chi2.ppf(p, total) / total for p in _ends(alpha / len(starts))]
+        rows.append((time[begin], time[last - 1], ratio / ends[1], ratio / ends[0]))
+        if stopped is None and not ends[0] <= ratio <= ends[1]:
+            stopped = float(time[begin])
+    return np.array(rows), stopped
+
+
+def _ends(alpha: float) -> tuple[float, float]:
+    return alpha / 2, 1 - alpha / 2
+
+
+def _channel(i: int, y: Array, variance: Array, white: Array, tail: float) -> Channel:
+    from scipy import stats
+
+    with np.errstate(invalid="ignore"):
+        r = y / np.sqrt(np.where(variance > 0, variance, np.nan))
+    r = r[np.isfinite(r)]
+    if not r.size:
+        nothing = float("nan")
+        return Channel(
+            i + 1, 0, nothing, nothing, nothing, nothing, (nothing,) * 3, 0.0, False, False
+        )
+    n, bias, scale = len(r), float(r.mean()), float(np.mean(r**2))
+    low, high = (scale * n / stats.chi2.ppf(p, n) for p in (1 - tail, tail))
+    spread = r.std() if n > 1 else 1.0
+    limit = stats.t.ppf(1 - tail, max(n - 1, 1))
+    biased = bool(n > 1 and abs(bias) * np.sqrt(n) > limit * spread)
+    u = white[np.isfinite(white)]
+    u = u - u.mean() if u.size else u
+    lags = min(LAGS, len(u) // 4)
+    power = float(u @ u)
+    r_lag = np.array([u[k:] @ u[:-k] for k in range(1, lags + 1)]) / (power or 1.0)
+    box = len(u) * (len(u) + 2) * np.sum(r_lag**2 / (len(u) - np.arange(1, lags + 1)))
+    coloured = bool(lags and box > stats.chi2.ppf(1 - 2 * tail, lags))
+    one, two, three = (float(np.mean(np.abs(r) <= k)) for k in (1, 2, 3))
+    within = (one, two, three)
+    first = float(r_lag[0]) if lags else 0.0
+    return Channel(i + 1, n, bias, scale, float(low), float(high), within, first, biased, coloured)
+
+
+def _errors(log: Log, tail: float) -> dict[str, Any]:
+    """NEES, its mean over n, and a band for as many independent errors as the run is worth."""
+    from scipy import stats
+
+    assert log.error is not None
+    values = nees(log.error, log.P)
+    used = values[np.isfinite(values)]
+    if not used.size:
+        return {"nees": values}
+    n = log.error.shape[1]
+    d = used - used.mean()
+    r = np.array([d[k:] @ d[: len(d) - k] for k in range(1, len(d) // 2)]) / (float(d @ d) or 1.0)
+    positive = r[: np.argmax(r < 0.05)] if (r < 0.05).any() else r
+    independent = max(1.0, len(used) / (1 + 2 * positive.sum()))
+    low, high = (stats.chi2.ppf(p, n * independent) / (n * independent) for p in (tail, 1 - tail))
+    return {
+        "nees": values,
+        "nees_ratio": float(used.mean() / n),
+        "nees_low": float(low),
+        "nees_high": float(high),
+    }
+
+
+def _findings(d: Diagnosis):
+    if d.indefinite:
+        yield f"S is not positive definite at {d.indefinite} updates"
+    if not d.low <= d.ratio <= d.high:
+        way = "too sure" if d.ratio > d.high else "not sure enough"
+        yield f"the filter is {way}: NIS {d.ratio:.2f} times what it should be"
+    if d.stopped is not None:
+        yield f"the first window outside its band begins at {d.stopped:g}"
+    for c in d.channels:
+        if c.biased:
+            yield f"channel {c.number} is biased by {c.bias:.2f} deviations"
+        if c.coloured:
+            before = f"correlation {c.correlation:.2f} with the one before"
+            yield f"channel {c.number} is not white: {before}"
+    if d.nees_ratio is not None and d.nees_low is not None and d.nees_high is not None:
+        wrong = f"NEES {d.nees_ratio:.2f} times what it should be"
+        if d.nees_ratio > d.nees_high:
+            yield f"the errors are larger than claimed: {wrong}"
+        elif d.nees_ratio < d.nees_low:
+            yield f"the errors are smaller than claimed: {wrong}"

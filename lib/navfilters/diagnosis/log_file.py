@@ -1,0 +1,210 @@
+"""A filter's log: times, innovations with their covariances, and errors where a truth is known."""
+
+import csv
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from navfilters.numerics import validation
+from navfilters.numerics.extras import needed
+from navfilters.types import Array
+
+_VECTOR = re.compile(r"(innovation|error)_(\d+)")
+_MATRIX = re.compile(r"([SP])_(?:(\d)(\d)|(\d+)_(\d+))")
+
+
+class LogError(ValueError):
+    """A log that cannot be read; says where and what is needed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """What a filter wrote down.
+
+    Parameters
+    ----------
+    time : array (k,)
+        Of each update, in any unit; does not decrease.
+    innovation : array (k, m)
+        Measured minus expected; NaN where it was not measured.
+    S : array (k, m, m)
+        The covariance that the filter gave the innovation.
+    error : array (k, n), optional
+        Estimate minus truth after the update.
+    P : array (k, n, n), optional
+        The covariance that the filter gave the error. Needed with ``error``.
+    ignored : tuple of str
+        Columns of the file that were not used.
+
+    Raises
+    ------
+    LogError
+        Shapes that do not fit, times that decrease or are not finite, no update, an innovation
+        that was measured and has no variance.
+    """
+
+    time: Array
+    innovation: Array
+    S: Array
+    error: Array | None = None
+    P: Array | None = None
+    ignored: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name, axes in (("time", 1), ("innovation", 2), ("S", 3), ("error", 2), ("P", 3)):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            value = validation.real_array(name, value, "", finite=False)
+            if value.ndim != axes:
+                raise LogError(f"{name} must have {axes} axes; found shape {value.shape}")
+            object.__setattr__(self, name, value)
+        _fits("innovation", self.innovation, "S", self.S, len(self.time))
+        if (self.error is None) != (self.P is None):
+            raise LogError("error and P belong together; found one of them")
+        if self.error is not None:
+            _fits("error", self.error, "P", self.P, len(self.time))
+        _times(self.time)
+        measured = np.isfinite(self.innovation)
+        blind = measured & ~np.isfinite(np.diagonal(self.S, axis1=1, axis2=2))
+        if blind.any():
+            row, channel = np.argwhere(blind)[0]
+            raise LogError(
+                f"S must be finite where there is an innovation; found S_{channel + 1}{channel + 1}"
+                f" = {self.S[row, channel, channel]} at time {self.time[row]:g}"
+            )
+
+
+def _fits(name: str, vector: Array, other: str, matrix: Array | None, count: int) -> None:
+    assert matrix is not None
+    size = vector.shape[1]
+    if vector.shape != (count, size) or matrix.shape != (count, size, size) or not size:
+        raise LogError(
+            f"time, {name} and {other} must have shapes (k,), (k, n) and (k, n, n) with n at least "
+            f"1; found ({count},), {vector.shape} and {matrix.shape}"
+        )
+
+
+def _times(time: Array) -> None:
+    if not len(time):
+        raise LogError("time must hold at least one update; found none")
+    if not np.isfinite(time).all():
+        raise LogError(f"time must be finite; found {time[~np.isfinite(time)][0]}")
+    back = np.flatnonzero(np.diff(time) < 0)
+    if back.size:
+        before, after = time[back[0]], time[back[0] + 1]
+        raise LogError(f"time must not decrease; found {after:g} after {before:g}")
+
+
+def read_log(path: str | Path) -> Log:
+    """Read a log from a CSV file with a header, or from a Parquet file.
+
+    Parameters
+    ----------
+    path : path
+        Columns: ``time``; ``innovation_1`` to ``innovation_m``; ``S_11``, ``S_12``, ... of one
+        triangle or of both (``S_1_10`` from ten channels on); and, where a truth is known,
+        ``error_1`` to ``error_n`` with ``P_11``, ... An empty cell was not measured. Other columns
+        are named in ``ignored``.
+
+    Returns
+    -------
+    Log
+
+    Raises
+    ------
+    LogError
+        A missing column, a cell that is no number, an empty file.
+    ImportError
+        Parquet without pyarrow.
+    """
+    path = Path(path)
+    columns = _parquet(path) if path.suffix == ".parquet" else _csv(path)
+    if "time" not in columns:
+        raise LogError(f"{path}: column time is needed; found {', '.join(columns) or 'none'}")
+    innovation, S = _block(path, columns, "innovation", "S")
+    if innovation is None:
+        raise LogError(f"{path}: column innovation_1 is needed; found {', '.join(columns)}")
+    error, P = _block(path, columns, "error", "P")
+    known = [n for n in columns if n == "time" or _VECTOR.fullmatch(n) or _MATRIX.fullmatch(n)]
+    ignored = tuple(name for name in columns if name not in known)
+    try:
+        return Log(columns["time"], innovation, S, error, P, ignored)
+    except LogError as fault:
+        raise LogError(f"{path}: {fault}") from None
+
+
+def _csv(path: Path) -> dict[str, np.ndarray]:
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = list(csv.reader(file))
+    except UnicodeDecodeError as error:
+        raise LogError(f"{path}: a CSV file in UTF-8 is needed; found {error}") from None
+    if not rows:
+        raise LogError(f"{path}: a line of column names is needed; found an empty file")
+    names = [name.strip() for name in rows[0]]
+    double = {name for name in names if names.count(name) > 1}
+    if double:
+        raise LogError(f"{path}: column names must differ; found {sorted(double)[0]} twice")
+    filled = [(i, row) for i, row in enumerate(rows[1:], 2) if row]
+    for line, row in filled:
+        if len(row) != len(names):
+            raise LogError(f"{path}, line {line}: {len(names)} cells are needed; found {len(row)}")
+    used = [n for n in names if n == "time" or _VECTOR.fullmatch(n) or _MATRIX.fullmatch(n)]
+    columns: dict[str, np.ndarray] = {name: np.empty(0) for name in names}
+    for name in used:
+        j = names.index(name)
+        columns[name] = np.array([_number(path, line, name, row[j]) for line, row in filled])
+    return columns
+
+
+def _number(path: Path, line: int, name: str, cell: str) -> float:
+    try:
+        return float(cell) if cell.strip() else np.nan
+    except ValueError:
+        raise LogError(f"{path}, line {line}: {name} must be a number; found {cell!r}") from None
+
+
+def _parquet(path: Path) -> dict[str, np.ndarray]:
+    parquet = needed("pyarrow.parquet", "pyarrow", "a log in Parquet")
+    table = parquet.read_table(path)
+    columns = {}
+    for name in table.column_names:
+        values = table[name].to_numpy()
+        columns[name] = values.astype(float) if values.dtype.kind in "iuf" else np.empty(0)
+    return columns
+
+
+def _block(
+    path: Path, columns: Mapping[str, np.ndarray], vector: str, matrix: str
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """A vector and its covariance from their columns; None without any."""
+    found = [int(m[2]) for name in columns if (m := _VECTOR.fullmatch(name)) and m[1] == vector]
+    if not found:
+        return None, None
+    size = max(found)
+    names = [f"{vector}_{i}" for i in range(1, size + 1)]
+    _all_of(path, names, columns)
+    cov = np.empty((len(columns["time"]), size, size))
+    for i in range(size):
+        for j in range(i, size):
+            options = [n for a, b in ((i, j), (j, i)) for n in _names(matrix, a + 1, b + 1)]
+            name = next((n for n in options if n in columns), None)
+            if name is None:
+                raise LogError(f"{path}: column {options[0]} is needed; write 0 if it is zero")
+            cov[:, i, j] = cov[:, j, i] = columns[name]
+    return np.stack([columns[name] for name in names], axis=1), cov
+
+
+def _names(matrix: str, i: int, j: int) -> list[str]:
+    short = [f"{matrix}_{i}{j}"] if i < 10 and j < 10 else []
+    return [*short, f"{matrix}_{i}_{j}"]
+
+
+def _all_of(path: Path, names: Sequence[str], columns: Mapping[str, np.ndarray]) -> None:
+    for name in names:
+        if name not in columns:
+            raise LogError(f"{path}: column {name} is needed; found {', '.join(columns)}")

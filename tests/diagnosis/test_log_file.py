@@ -1,0 +1,110 @@
+"""Logs as files: what is read, and what every fault is called."""
+
+import numpy as np
+import pytest
+from logs import kalman_log, written
+from numpy.testing import assert_array_equal
+
+from navfilters.__main__ import main as navfilters
+from navfilters.diagnosis import Log, LogError, diagnose, read_log
+
+HEAD = "time,innovation_1,S_11\n"
+
+
+def test_what_is_written_is_read(tmp_path):
+    log = kalman_log(gaps=0.3)
+    again = read_log(written(log, tmp_path / "log.csv"))
+    for name in ("time", "innovation", "error"):
+        assert_array_equal(getattr(again, name), getattr(log, name))
+    for name in ("S", "P"):  # one triangle is written
+        assert_array_equal(np.triu(getattr(again, name)), np.triu(getattr(log, name)))
+    assert again.ignored == ()
+
+
+def test_either_triangle_long_names_and_other_columns(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "\ufefftime, innovation_1,innovation_2,S_11,S_21,S_2_2,note\n0,1,2,3,0.5,4,hello\n"
+    )
+    log = read_log(path)
+    assert_array_equal(log.S, [[[3.0, 0.5], [0.5, 4.0]]])
+    assert log.ignored == ("note",)
+
+
+FAULTS = {
+    "empty": ("", "line of column names"),
+    "no time": ("innovation_1,S_11\n1,1\n", "column time is needed; found innovation_1, S_11"),
+    "no innovation": ("time,S_11\n1,1\n", "column innovation_1 is needed"),
+    "a channel is missing": ("time,innovation_2,S_11,S_12,S_22\n", "innovation_1 is needed"),
+    "no variance": ("time,innovation_1\n1,1\n", "column S_11 is needed"),
+    "no covariance": ("time,innovation_1,innovation_2,S_11,S_22\n", "S_12 is needed; write 0"),
+    "no P": (HEAD.replace("\n", ",error_1\n"), "column P_11 is needed"),
+    "twice": ("time,time\n", "found time twice"),
+    "a word": (HEAD + "1,abc,1\n", "line 2: innovation_1 must be a number; found 'abc'"),
+    "a cell too few": (HEAD + "1,2,3\n1,2\n", "line 3: 3 cells are needed; found 2"),
+    "no row": (HEAD, "time must hold at least one update"),
+    "time goes back": (HEAD + "2,1,1\n1,1,1\n", "must not decrease; found 1 after 2"),
+    "no time in a row": (HEAD + ",1,1\n", "time must be finite"),
+    "measured without S": (HEAD + "1,1,\n", "S must be finite where there is an innovation"),
+}
+
+
+@pytest.mark.parametrize(("content", "message"), FAULTS.values(), ids=FAULTS)
+def test_what_is_wrong_with_a_file_is_said(tmp_path, content, message):
+    path = tmp_path / "log.csv"
+    path.write_text(content)
+    with pytest.raises(LogError, match=message) as error:
+        read_log(path)
+    assert str(path) in str(error.value)
+
+
+def test_what_is_no_text(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(b"\xff\xfe\x00\x01")
+    with pytest.raises(LogError, match="UTF-8"):
+        read_log(path)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ((np.ones(3), np.ones((3, 2)), np.ones((3, 2))), "S must have 3 axes"),
+        ((np.ones(3), np.ones((2, 1)), np.ones((2, 1, 1))), r"shapes \(k,\)"),
+        ((np.ones(3), np.ones((3, 1)), np.ones((3, 1, 1)), np.ones((3, 1))), "belong together"),
+    ],
+)
+def test_arrays_that_do_not_fit(fields, message):
+    with pytest.raises(LogError, match=message):
+        Log(*fields)
+
+
+def test_the_command_and_its_exit_status(tmp_path, capsys):
+    good = written(kalman_log(), tmp_path / "good.csv")
+    bad = written(kalman_log(told_r=0.1), tmp_path / "bad.csv")
+    assert navfilters(["diagnose", str(good)]) == 0
+    assert "nothing wrong at 95%" in capsys.readouterr().out
+    numbers, picture = tmp_path / "found.json", tmp_path / "found.png"
+    status = navfilters(
+        ["diagnose", str(bad), "--json", str(numbers), "--plot", str(picture), "--angle", "2:360"]
+    )
+    assert status == 1
+    assert "WRONG: the filter is too sure" in capsys.readouterr().out
+    assert diagnose(read_log(bad)).findings[0] in numbers.read_text()
+    assert picture.stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["missing.csv"], "No such file"),
+        (["--angle", "x", "log.csv"], "2 or 2:360 is meant"),
+        (["--angle", "9", "log.csv"], "channels 1 to 2"),
+    ],
+)
+def test_the_command_says_what_is_wrong(tmp_path, capsys, arguments, message):
+    written(kalman_log(steps=20), tmp_path / "log.csv")
+    given = [str(tmp_path / a) if a.endswith(".csv") else a for a in arguments]
+    with pytest.raises(SystemExit) as end:
+        navfilters(["diagnose", *given])
+    assert end.value.code == 2
+    assert message in capsys.readouterr().err

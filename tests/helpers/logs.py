@@ -1,0 +1,46 @@
+"""Logs of Kalman filters of a target on a line, right ones and ones with a fault."""
+
+import numpy as np
+
+from navfilters.diagnosis import Log
+
+F = np.array([[1.0, 1.0], [0.0, 1.0]])
+Q = np.diag([0.01, 0.02])
+R = np.diag([0.5, 0.2])
+
+
+def kalman_log(seed=0, steps=400, *, told_r=1.0, told_q=1.0, late=None, gaps=0.0):
+    """Position and velocity, both measured; what it is told may be wrong, from ``late`` on."""
+    rng = np.random.default_rng(seed)
+    x, mean, P = np.zeros(2), np.zeros(2), np.eye(2)
+    x = rng.multivariate_normal(mean, P)
+    rows = []
+    for k in range(steps):
+        wrong = late is None or k >= late
+        r, q = (told_r, told_q) if wrong else (1.0, 1.0)
+        x = F @ x + rng.multivariate_normal(np.zeros(2), Q)
+        z = x + rng.multivariate_normal(np.zeros(2), R)
+        mean, P = F @ mean, F @ P @ F.T + q * Q
+        S, y = P + r * R, z - mean
+        seen = rng.random(2) >= gaps
+        rows.append((k + 1.0, np.where(seen, y, np.nan), S))
+        H = np.eye(2)[seen]
+        K = P @ H.T @ np.linalg.inv(H @ S @ H.T)
+        mean, P = mean + K @ (H @ y), P - K @ H @ P
+        rows[-1] += (mean - x, P)
+    return Log(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+def written(log, path):
+    """The log as a CSV file."""
+    m, n = log.innovation.shape[1], log.error.shape[1]
+    pairs = [(i, j) for i in range(m) for j in range(i, m)]
+    names = ["time", *(f"innovation_{i + 1}" for i in range(m))]
+    names += [f"S_{i + 1}{j + 1}" for i, j in pairs]
+    names += [*(f"error_{i + 1}" for i in range(n)), *(f"P_{i + 1}{j + 1}" for i, j in pairs)]
+    lines = [",".join(names)]
+    for t, y, S, e, P in zip(log.time, log.innovation, log.S, log.error, log.P, strict=True):
+        cells = [t, *y, *(S[i, j] for i, j in pairs), *e, *(P[i, j] for i, j in pairs)]
+        lines.append(",".join("" if np.isnan(c) else repr(float(c)) for c in cells))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
