@@ -1,8 +1,9 @@
 """Patients for filters, cures for them, and what became of each pair."""
 
 from navfilters.problems.catalogue import problems
-from navfilters.problems.cures import CURES, Cure, UnfitError
+from navfilters.problems.cures import Cure, UnfitError
 from navfilters.problems.evaluations import evaluations
+from navfilters.problems.later_cures import CURES
 from navfilters.problems.noisier import Noisier
 from navfilters.problems.outcome import Outcome, treat
 from navfilters.problems.problem import LOST, Draw, Problem

@@ -45,7 +45,7 @@ class Cure:
     parameter: str = ""
 
 
-def plain(estimator: Filter) -> Callable[[Problem, Any], Treatment]:
+def plain(estimator: Any) -> Callable[[Problem, Any], Treatment]:
     """A cure that is a filter, without a parameter."""
     return lambda problem, value: (problem, estimator)
 
@@ -113,5 +113,3 @@ PAPERS = (
     Cure("timed Q", partial(_noisier, timed=True), 1e8, NOISES, "factor of Q in the burns"),
 )
 """Of the four works: ten filters, underweighting, three rules, and Q by hand."""
-
-CURES = PAPERS

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from navfilters.estimators import model_parts
+from navfilters.estimators import Modes, model_parts
 from navfilters.estimators.any_filter import as_filter
 from navfilters.problems.problem import Problem
 from navfilters.types import Gaussian
@@ -30,9 +30,11 @@ def evaluations(problem: Problem, estimator: Any, step: int = 2) -> int:
     """
     draw, estimator, count = problem.drawn(1), as_filter(estimator), Count()
     state = estimator.init(Gaussian(draw.prior.mean[0], draw.prior.cov))
-    model, dynamics = Counted(problem.model, count), None
-    if problem.dynamics is not None:
-        dynamics = Counted(problem.dynamics, count)
+    model, dynamics = Counted(problem.model, count), problem.dynamics
+    if isinstance(dynamics, Modes):
+        dynamics = Modes(tuple(Counted(mode, count) for mode in dynamics.modes))
+    elif dynamics is not None:
+        dynamics = Counted(dynamics, count)
     for k in range(step + 1):
         count.states = 0
         state = estimator.step(state, draw.z[k, 0], model, dynamics, k)

@@ -100,7 +100,8 @@ def treat(
     ValueError, TypeError, SweepError
         As of ``sweep``: a filter that does not fit the problem.
     """
-    draw, told = problem.drawn(runs, seed), problem if believed is None else believed
+    told = problem if believed is None else believed
+    draw = told.drawn(runs, seed)
     batch = (runs,) if settings is None else (settings, runs)
     front = (slice(None),) if settings is None else (slice(None), None)
     (mean, cov), innovation, S = sweep(
@@ -114,15 +115,19 @@ def treat(
         workers=1,
         progress=False,
     ).record
-    truth = draw.truth[front]
+    window = slice(problem.since, None)
+    truth, seen = (
+        problem.drawn(runs, seed).truth[front],
+        mean if told.back is None else told.back(mean),
+    )
     with np.errstate(all="ignore"):  # a run that fails is no number, and lost
-        error = problem.error(mean[problem.since :], truth[problem.since :])
+        error = problem.error(seen[window], truth[window])
         square = np.mean(np.sum(error[..., list(problem.judged)] ** 2, axis=-1), axis=0)
         each = np.sqrt(np.broadcast_to(square, batch))
-        last = nees(error[-1], cov[-1])
+        last = nees(told.error(mean[-1], draw.truth[front][-1]), cov[-1])
         of_innovation = nis(innovation[1:], S[1:])
     each, last = np.where(np.isfinite(each), each, np.inf), np.broadcast_to(last, batch)
-    reference, dof = problem.reference(runs, seed), error.shape[-1]
+    reference, dof = problem.reference(runs, seed), cov.shape[-1]
     counted = np.isfinite(last)
     total, count = np.where(counted, last, 0.0).sum(axis=-1), counted.sum(axis=-1)
     low, high = chi_square_band(dof, runs, CONFIDENCE)

@@ -1,7 +1,7 @@
 """What a filter is tried on: a patient, its draws, and how well an honest filter could do."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -57,6 +57,9 @@ class Problem:
         What the filter knows of the motion.
     burning : bool array (steps,), optional
         Steps in which a force acts that the filter does not know.
+    back : callable, optional
+        From this problem's states to those of the problem that it stands for, if a cure writes the
+        state in another way.
     """
 
     name: str
@@ -67,7 +70,8 @@ class Problem:
     unit: str
     since: int
     dynamics: Any = None
-    burning: Array | None = field(default=None)
+    burning: Array | None = None
+    back: Callable[[Array], Array] | None = None
 
     def __post_init__(self) -> None:
         validation.whole_number("steps", self.steps, 1)

@@ -8,8 +8,9 @@ import numpy as np
 
 from navfilters.numerics.extras import needed
 from navfilters.problems.catalogue import problems
-from navfilters.problems.cures import CURES, Cure, UnfitError
+from navfilters.problems.cures import Cure, UnfitError
 from navfilters.problems.evaluations import evaluations
+from navfilters.problems.later_cures import CURES
 from navfilters.problems.outcome import Outcome, treat
 from navfilters.problems.problem import Problem
 
