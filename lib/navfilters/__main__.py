@@ -9,6 +9,7 @@ from navfilters.numerics.extras import command
 from navfilters.version import __version__
 
 COMMANDS = {
+    "crash-test": ("navfilters.crash.command", "what this book knows, asked of your filter"),
     "diagnose": ("navfilters.diagnosis.report", "test a filter's log of innovations"),
     "cures": ("navfilters.problems.__main__", "every cure on every patient"),
     "perea2007": (

@@ -34,7 +34,8 @@ class Outcome:
     band : tuple of float
         Where an honest filter's mean lies.
     nis : float array (...)
-        Mean over all updates and runs, over the number of measurements: 1 if honest.
+        Mean over all updates and runs, over the number of measurements: 1 if honest; NaN of a
+        filter that tells no innovations.
     covered : float array (...)
         Share of the runs whose NEES is within the 95 % quantile.
     """
@@ -125,7 +126,6 @@ def treat(
         square = np.mean(np.sum(error[..., list(problem.judged)] ** 2, axis=-1), axis=0)
         each = np.sqrt(np.broadcast_to(square, batch))
         last = nees(told.error(mean[-1], draw.truth[front][-1]), cov[-1])
-        of_innovation = nis(innovation[1:], S[1:])
     each, last = np.where(np.isfinite(each), each, np.inf), np.broadcast_to(last, batch)
     reference, dof = problem.reference(runs, seed), cov.shape[-1]
     counted = np.isfinite(last)
@@ -140,9 +140,17 @@ def treat(
         nees=np.where(2 * count >= runs, total / np.maximum(count, 1), np.inf),
         dof=dof,
         band=(float(low), float(high)),
-        nis=np.nanmean(of_innovation, axis=(0, -1)) / S.shape[-1],
+        nis=_mean_nis(innovation, S),
         covered=np.mean(counted & (last <= quantile), axis=-1),
     )
+
+
+def _mean_nis(innovation: Array | None, S: Array | None) -> Array:
+    """Over updates and runs, over the number of measurements; NaN of a filter that has none."""
+    if innovation is None or S is None:
+        return np.array(np.nan)
+    with np.errstate(all="ignore"):
+        return np.nanmean(nis(innovation[1:], S[1:]), axis=(0, -1)) / S.shape[-1]
 
 
 def _kept(state: Any) -> Any:

@@ -1,0 +1,19 @@
+"""Crash test: what this book knows about filters, asked of yours."""
+
+from navfilters.crash.adapters import Adapted, from_filterpy, from_functions
+from navfilters.crash.check import Case, Check
+from navfilters.crash.report import Finding, Report
+from navfilters.crash.suite import CHECKS, SUITES, crash_test
+
+__all__ = [
+    "CHECKS",
+    "SUITES",
+    "Adapted",
+    "Case",
+    "Check",
+    "Finding",
+    "Report",
+    "crash_test",
+    "from_filterpy",
+    "from_functions",
+]

@@ -1,0 +1,171 @@
+"""What a report says, in lines, as data, as a page, as a command and as a fixture."""
+
+import json
+
+import numpy as np
+import pytest
+from bs4 import BeautifulSoup
+from faulty import ekf
+
+from navfilters import FILTERS
+from navfilters.__main__ import main as navfilters
+from navfilters.crash import CHECKS, Case, crash_test, from_filterpy, from_functions
+from navfilters.crash import suite as suites
+
+pytest_plugins = ["navfilters.crash.pytest_plugin"]
+
+
+@pytest.fixture(scope="module")
+def report():
+    return crash_test(ekf("no wrap"), ["linear", "jump"], name="mine", progress=False)
+
+
+def test_lines(report):
+    text = str(report)
+    assert text.startswith("mine: 1 of 2 checks passed\npass  linear")
+    assert "FAIL  jump" in text
+    assert "range-bearing/sensitivity" in text
+
+
+def test_three_lines_reproduce_a_failure(report):
+    *imports, call = report.reproduce(report.findings[1])
+    assert imports[0] == "from navfilters.crash import CHECKS"
+    found = {}
+    exec(
+        f"{imports[0]}\nfound['cases'] = CHECKS['jump'](mine)",
+        {"mine": ekf("no wrap"), "found": found},
+    )
+    assert not found["cases"][0].passed
+    assert "CHECKS['jump'](mine)" in call
+
+
+def test_data(report):
+    data = json.loads(report.json())
+    assert [row["passed"] for row in data["checks"]] == [True, False]
+    case = data["checks"][1]["cases"][0]
+    assert case["value"] > case["limit"]
+
+
+def test_page(report):
+    soup = BeautifulSoup(report.html(), "html.parser")
+    assert [s["class"] for s in soup.find_all("section")] == [["pass"], ["fail"]]
+    assert not soup.find_all(["script", "link", "img"])
+    assert "CHECKS" in soup.pre.text
+
+
+def test_a_filter_that_raises_fails_and_says_why():
+    def broken(x, P, z, model):
+        raise ZeroDivisionError("no luck")
+
+    report = crash_test(from_functions(lambda x, P, d: (x, P), broken), ["linear"], progress=False)
+    assert report.failed == ("linear",)
+    assert "it raised ZeroDivisionError: no luck" in str(report)
+
+
+def test_a_filter_without_numbers_fails():
+    def lost(x, P, z, model):
+        return x * np.nan, P
+
+    report = crash_test(from_functions(lambda x, P, d: (x, P), lost), "correct", progress=False)
+    assert set(report.failed) >= {"linear", "motion", "missing", "exact", "jump", "units"}
+
+
+def test_what_is_not_asked_does_not_fail():
+    report = crash_test(ekf(), ["images, TC-1"], progress=False)
+    assert report.passed
+    assert report.findings[0].passed is None
+    assert "attitude" in report.findings[0].line
+
+
+def test_an_interruption_keeps_what_was_done(monkeypatch):
+    real = suites._examined
+
+    def stop(filter, check):
+        if check.name == "motion":
+            raise KeyboardInterrupt
+        return real(filter, check)
+
+    monkeypatch.setattr(suites, "_examined", stop)
+    report = crash_test(ekf(), ["linear", "motion", "missing"], progress=False)
+    assert [f.check.name for f in report.findings] == ["linear"]
+    assert report.missing == ("motion", "missing")
+    assert not report.passed
+    assert "interrupted; not made: motion, missing" in str(report)
+
+
+def test_no_number_is_beyond_every_limit():
+    case = Case("somewhere", "what", np.nan, 1.0)
+    assert not case.passed
+    assert case.excess == np.inf
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: crash_test(ekf(), "fast"), "suite must be one of .*found 'fast'"),
+        (lambda: crash_test(ekf(), ["linear", "x"]), "found 'x'"),
+        (lambda: crash_test(7), "estimator must be a filter"),
+        (lambda: from_functions(7, ekf), "predict must be a function; found 7"),
+        (lambda: from_filterpy(dict), "one of filterpy's four; found dict"),
+        (lambda: from_filterpy(dict, alpha=1), r"unknown options \['alpha'\]"),
+    ],
+)
+def test_bad_input_is_refused(call, message):
+    with pytest.raises((ValueError, TypeError), match=message):
+        call()
+
+
+MINE = """
+from faulty import ekf
+right, wrong = ekf(), ekf("no wrap")
+"""
+
+
+def test_the_command(tmp_path, monkeypatch, capsys):
+    (tmp_path / "mine.py").write_text(MINE)
+    monkeypatch.chdir(tmp_path)
+    assert navfilters(["crash-test", "mine:right", "--check", "jump"]) == 0
+    page, data = tmp_path / "r.html", tmp_path / "r.json"
+    given = [
+        "crash-test",
+        "mine:wrong",
+        "--check",
+        "jump",
+        "--html",
+        str(page),
+        "--json",
+        str(data),
+    ]
+    assert navfilters(given) == 1
+    assert "from mine import wrong as mine" in capsys.readouterr().out
+    assert page.read_text().startswith("<!doctype html>")
+    assert json.loads(data.read_text())["filter"] == "mine:wrong"
+
+
+@pytest.mark.parametrize(
+    ("where", "message"),
+    [
+        ("mine", "MODULE:NAME is needed"),
+        ("no_such_module_here:x", "no module no_such_module_here"),
+        ("mine:nothing", "mine has no nothing"),
+    ],
+)
+def test_the_command_says_what_is_wrong(tmp_path, monkeypatch, capsys, where, message):
+    (tmp_path / "mine.py").write_text(MINE)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as end:
+        navfilters(["crash-test", where])
+    assert end.value.code == 2
+    assert message in capsys.readouterr().err
+
+
+def test_the_fixture(crash_test):
+    crash_test(FILTERS["EKF"], ["linear"])
+    with pytest.raises(pytest.fail.Exception, match="jump"):
+        crash_test(ekf("no wrap"), ["jump"])
+
+
+def test_checks_name_chapters_that_exist():
+    from browser import toc
+
+    assert {f"book/{c.chapter}" for c in CHECKS.values()} <= set(toc())
