@@ -12,6 +12,7 @@ from scipy.stats import multivariate_normal
 from navfilters import FILTERS, Filter, Gaussian, linearized, run, sweep
 from navfilters.estimators.adaptive import AdaptiveNoise
 from navfilters.estimators.robust import AdaptiveRobust, Robust
+from navfilters.estimators.update import FORMS
 from navfilters.models import Linear, RangeBearing
 from navfilters.runs import records
 
@@ -64,7 +65,7 @@ class Part:
 
 
 @pytest.mark.parametrize("name", COMPONENTWISE)
-@pytest.mark.parametrize("form", ["joseph", "short"])
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("i", [0, 1])
 def test_what_is_not_measured_is_not_in_the_model(name, form, i):
     """As a model of the other components alone. The circular bumps weigh all sensors together."""

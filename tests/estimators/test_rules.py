@@ -75,11 +75,11 @@ def test_a_missing_measurement_is_its_member_s_alone(name):
     assert np.isfinite(states[-1].estimate.mean).all()
     assert states[-1].missed.tolist() == [0, 0, 0, 1]
     assert np.isnan(states[6].innovation[2:]).tolist() == [[True, False], [True, True]]
-    before, after = states[5].memory or (), states[6].memory or ()
+    alone = Filter(rule=RULES[name](p)).predict(states[5], p.dynamics)
+    before, after = alone.memory or (), states[6].memory or ()
     for a, b, whole in zip(before, after, clean[6].memory or (), strict=True):
         assert_array_equal(b[2:], a[2:])
         assert_array_equal(b[others], whole[others])
-    alone = Filter(rule=RULES[name](p)).predict(states[5], p.dynamics)
     assert_array_equal(states[6].estimate.mean[3], alone.estimate.mean[3])
     assert_array_equal(states[6].estimate.cov[3], alone.estimate.cov[3])
 
@@ -117,6 +117,10 @@ def test_a_covariance_that_is_nan_stays_with_its_member(name):
         ("AREKF", "alpha", [0.0, 0.1, 0.5, 1.0]),
         ("AREKF", "rho", [0.0, 0.5, 0.98, 5.0]),
         ("AREKF", "lam", [1.0, 2.0, 5.0, 9.0]),
+        ("strong tracking", "rho", [0.0, 0.5, 0.9, 1.0]),
+        ("strong tracking", "beta", [1.0, 2.0, 5.0, 9.0]),
+        ("gated", "factor", [1.0, 2.0, 5.0, 9.0]),
+        ("gated", "largest", [1.0, 2.0, 5.0, 9.0]),
     ],
 )
 def test_each_member_may_have_its_own_parameter(name, option, values):

@@ -11,7 +11,9 @@ from naive import covariances, quadratic
 
 from navfilters import Filter, Gaussian
 from navfilters.estimators.adaptive import AdaptiveNoise
+from navfilters.estimators.gated_inflation import GatedInflation
 from navfilters.estimators.robust import AdaptiveRobust, Robust
+from navfilters.estimators.strong_tracking import StrongTracking
 from navfilters.models import Linear
 
 inv = np.linalg.inv
@@ -82,6 +84,8 @@ RULES = {
     "REKF": lambda p: Robust(1.5),
     "AEKF": lambda p: AdaptiveNoise(a=0.5, N=8, directions=p.directions),
     "AREKF": lambda p: AdaptiveRobust(),
+    "strong tracking": lambda p: StrongTracking(),
+    "gated": lambda p: GatedInflation(),
 }
 SIZES = [(1, 1), (3, 2), (6, 2), (4, 3)]
 

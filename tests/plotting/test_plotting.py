@@ -13,6 +13,7 @@ from matplotlib import pyplot as plt
 from navfilters import FILTERS
 from navfilters.book import plotting
 from navfilters.book.plotting.styles import STYLES
+from navfilters.estimators import LATER_FILTERS
 
 
 @pytest.fixture
@@ -23,7 +24,7 @@ def ax():
 
 
 def test_every_filter_has_a_style():
-    assert set(FILTERS) <= set(STYLES)
+    assert set(FILTERS | LATER_FILTERS) <= set(STYLES)
 
 
 @pytest.mark.parametrize(("one", "other"), list(combinations(STYLES, 2)))

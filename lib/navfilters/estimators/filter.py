@@ -2,7 +2,7 @@
 
 ::
 
-    predict --rule on P--> moments --variant--> update --retraction--> state
+    predict --rule on P--> moments --variant--> correction --retraction--> state
 """
 
 from collections.abc import Callable
@@ -13,31 +13,20 @@ from typing import Any
 import numpy as np
 
 from navfilters.estimators import model_parts
+from navfilters.estimators.correction import Correction, Observation, once
 from navfilters.estimators.limits import LIMITS
-from navfilters.estimators.moments import linearized, second_order, unscented
+from navfilters.estimators.moments import linearized
 from navfilters.estimators.options import accepted, keywords
-from navfilters.estimators.prediction import (
-    predict_linearized,
-    predict_second_order,
-    predict_unscented,
-)
+from navfilters.estimators.prediction import PREDICTIONS, in_parts, predict_linearized
 from navfilters.estimators.rule import Rule
 from navfilters.estimators.state import FilterState, first_state, given_prior, keep, kept, missed
-from navfilters.estimators.update import (
-    FORMS,
-    Form,
-    absent,
-    correct,
-    fit,
-    innovation,
-    kalman_update,
-)
+from navfilters.estimators.update import FORMS, Form, absent, fit, innovation
 from navfilters.estimators.variants import Variant, unchanged
 from navfilters.numerics import validation
 from navfilters.types import Array, Gaussian, MeasurementModel, Moments
 
-PREDICTIONS = {second_order: predict_second_order, unscented: predict_unscented}
-"""How the moments functions predict a state; all others linearise."""
+STAGES = ("moments", "variant", "correction")
+"""Those that have options."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +44,11 @@ class Filter:
         (prior, model, moments, \\*, options) -> (prior, Moments).
     rule : Rule, optional
         Robust and adaptive filters have one.
-    form : {"joseph", "short"}
+    form : {"joseph", "short", "sqrt"}
         Of the update: see :func:`~navfilters.estimators.update.kalman_update`.
+    correction : callable
+        (observation, prior, moments, innovation, \\*, options) -> Gaussian: see
+        :mod:`navfilters.estimators.correction`.
 
     Raises
     ------
@@ -68,6 +60,7 @@ class Filter:
     variant: Variant = unchanged
     rule: Rule | None = None
     form: Form = "joseph"
+    correction: Correction = once
 
     def __post_init__(self) -> None:
         if self.form not in FORMS:
@@ -85,7 +78,7 @@ class Filter:
         model : MeasurementModel
             Where it comes from.
         **options
-            Those of the moments function and of the variant; see ``options``.
+            Those of the stages; see ``options``.
 
         Returns
         -------
@@ -105,18 +98,16 @@ class Filter:
                 "a filter with a rule has a memory: use run, sweep, or init and step; found "
                 f"{type(self.rule).__name__}"
             )
-        self._know(options)
         prior = given_prior(prior)
         z, model = model_parts.seen(validation.given("z", z), model, 0)
-        moments = self.moments(prior, model, **accepted(self.moments, options))
-        changed, moments = self.variant(prior, model, moments, **accepted(self.variant, options))
-        updated = kalman_update(changed, z, moments, form=self.form, model=model)
-        return kept(absent(z), prior, updated)
+        told, gone = self.having(**options) if options else self, absent(z)
+        updated, *_ = told._corrected(prior, z, model, gone, told.variant)
+        return kept(gone, prior, updated)
 
     @property
     def options(self) -> tuple[str, ...]:
         """Names of the keywords that this filter takes."""
-        return (*keywords(self.moments), *keywords(self.variant))
+        return tuple(name for stage in STAGES for name in keywords(getattr(self, stage)))
 
     def having(self, **options) -> "Filter":
         """The same filter with these options.
@@ -137,7 +128,7 @@ class Filter:
         """
         self._know(options)
         stages: dict[str, Any] = {}
-        for name in ("moments", "variant"):
+        for name in STAGES:
             stage = getattr(self, name)
             if own := accepted(stage, options):
                 stages[name] = partial(stage, **own)
@@ -185,9 +176,12 @@ class Filter:
         function = getattr(self.moments, "func", self.moments)
         predict = PREDICTIONS.get(function, predict_linearized)
         options = accepted(predict, getattr(self.moments, "keywords", {}))
-        return state._replace(
-            estimate=predict(state.estimate, dynamics, Q, **options), memory=memory
-        )
+        if self.rule is not None and self.rule.parts:
+            estimate, W = in_parts(predict, state.estimate, dynamics, Q, **options)
+            memory = self.rule.noise_added(memory, W)
+        else:
+            estimate = predict(state.estimate, dynamics, Q, **options)
+        return state._replace(estimate=estimate, memory=memory)
 
     def update(self, state: FilterState, z: Array, sensor: Any, k: Array = 0) -> FilterState:
         """The state after a measurement.
@@ -210,15 +204,28 @@ class Filter:
         prior, memory, moments = state.estimate, state.memory, None
         if self.rule is not None:
             prior, memory, moments = self._ruled(state, z, sensor, gone)
-        if moments is None:
-            moments = self.moments(prior, sensor)
         variant = model_parts.at(self.variant, k)
-        prior, moments = variant(prior, sensor, moments)
-        fit(prior, z, moments)
-        y = innovation(z, moments, sensor)
-        estimate = correct(prior, y, moments, self.form, sensor, gone)
+        estimate, y, S = self._corrected(prior, z, sensor, gone, variant, moments)
         estimate = kept(gone, state.estimate, estimate)
-        return FilterState(estimate, missed(state, gone), memory, y, moments.P_zz)
+        return FilterState(estimate, missed(state, gone), memory, y, S)
+
+    def _corrected(
+        self,
+        prior: Gaussian,
+        z: Array,
+        model: Any,
+        gone: Array | None,
+        variant: Variant,
+        moments: Moments | None = None,
+    ) -> tuple[Gaussian, Array, Array]:
+        """The corrected prior, the innovation and its covariance."""
+        if moments is None:
+            moments = self.moments(prior, model)
+        seen = Observation(z, model, gone, prior, moments, self.moments, variant, self.form)
+        changed, moments = seen.expected()
+        fit(changed, z, moments)
+        y = innovation(z, moments, model)
+        return self.correction(seen, changed, moments, y), y, moments.P_zz
 
     def _ruled(
         self, state: FilterState, z: Array, sensor: Any, gone: Array | None

@@ -1,4 +1,6 @@
-"""How a filter predicts its measurement: three approximations of the same three moments."""
+"""How a filter predicts its measurement: approximations of the same three moments."""
+
+from functools import partial
 
 from navfilters.estimators.model_parts import hessian, jacobian, noise, residual, retract
 from navfilters.estimators.sigma_points import SigmaPoints, behind, is_singular, offsets, root_of
@@ -66,6 +68,46 @@ def second_order(prior: Gaussian, model: MeasurementModel) -> Moments:
     b = second_order_bias(prior, model)
     squares = b[..., :, None] * b[..., None, :]
     return first._replace(z_hat=first.z_hat + b, P_zz=first.P_zz - squares, R=first.R - squares)
+
+
+def gaussian_second_order(prior: Gaussian, model: MeasurementModel) -> Moments:
+    """Moments of the Gaussian second-order filter: those of a quadratic h of a Gaussian state.
+
+    z_hat = h(x) + b,   P_zz = R + H P H^T + C,   P_xz = P H^T,   C_ij = tr(h_i'' P h_j'' P) / 2
+
+    Parameters
+    ----------
+    prior : Gaussian
+        mean (..., n), cov (..., n, n).
+    model : MeasurementModel
+        Gives h, jacobian, hessian (..., m, n, n) and R.
+
+    Returns
+    -------
+    Moments
+        z_hat (..., m), P_zz (..., m, m) and P_xz (..., n, m).
+
+    Notes
+    -----
+    :func:`second_order` has -b b^T in the place of C: a Gaussian's fourth moments are not zero but
+    b b^T + C.
+
+    References
+    ----------
+    athans1968.
+    """
+    first = linearized(prior, model)
+    curvature = matmul(hessian(model, prior.mean), prior.cov[..., None, :, :])
+    b, C = of_curvature(curvature)
+    return first._replace(z_hat=first.z_hat + b, P_zz=first.P_zz + C, R=first.R + C)
+
+
+def of_curvature(curvature: Array) -> tuple[Array, Array]:
+    """b_i = tr(A_i) / 2 and C_ij = tr(A_i A_j) / 2 of A_i = h_i'' P, (..., m, n, n)."""
+    xp = curvature.__array_namespace__()
+    b = xp.sum(xp.linalg.diagonal(curvature), axis=-1) / 2
+    pairs = curvature[..., :, None, :, :] * curvature.mT[..., None, :, :, :]
+    return b, xp.sum(pairs, axis=(-2, -1)) / 2
 
 
 def second_order_bias(prior: Gaussian, model: MeasurementModel) -> Array:
@@ -147,3 +189,8 @@ def unscented(
     W0_c, W_i = W0_c[..., None, None], W_i[..., None, None]
     P_zz = R + W0_c * outer_sum(dZ[:1], dZ[:1]) + W_i * outer_sum(dZ[1:], dZ[1:])
     return Moments(z_hat, P_zz, W_i * outer_sum(dX[1:], dZ[1:]), exact=exact)
+
+
+cubature = partial(unscented, points=SigmaPoints(alpha=1.0, beta=0.0, kappa=0.0))
+"""Moments by the third-degree spherical-radial cubature rule (arasaratnam2009): the unscented
+transform whose central point has no weight and whose 2 n others stand at sqrt(n) deviations."""

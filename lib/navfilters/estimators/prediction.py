@@ -1,8 +1,16 @@
 """How a filter predicts its state: the approximation of its moments, with f in the place of h."""
 
+from collections.abc import Callable
+
 from navfilters.estimators.model_parts import by_error, difference, moved, retract, transition
+from navfilters.estimators.moments import (
+    gaussian_second_order,
+    of_curvature,
+    second_order,
+    unscented,
+)
 from navfilters.estimators.sigma_points import SigmaPoints, behind, offsets, root_of
-from navfilters.numerics.small_matrices import outer_sum
+from navfilters.numerics.small_matrices import matmul, outer_sum
 from navfilters.numerics.state_derivatives import first_derivative, second_derivative
 from navfilters.types import Array, Dynamics, Gaussian
 
@@ -58,6 +66,32 @@ def predict_second_order(estimate: Gaussian, dynamics: Dynamics, Q: Array) -> Ga
     return Gaussian(retract(dynamics, first.mean, b), first.cov - squares)
 
 
+def predict_gaussian_second_order(estimate: Gaussian, dynamics: Dynamics, Q: Array) -> Gaussian:
+    """As :func:`predict_linearized`, with what the curvature of f adds for a Gaussian.
+
+    x' = f(x) + b,   P' = F P F^T + Q + C,   b_i = tr(f_i'' P) / 2,   C_ij = tr(f_i'' P f_j'' P) / 2
+
+    Parameters
+    ----------
+    estimate : Gaussian
+    dynamics : Dynamics
+        As of :func:`predict_second_order`.
+    Q : array (..., n, n)
+
+    Returns
+    -------
+    Gaussian
+
+    References
+    ----------
+    athans1968.
+    """
+    first = predict_linearized(estimate, dynamics, Q)
+    second = transition_hessian(dynamics, estimate.mean)
+    b, C = of_curvature(matmul(second, estimate.cov[..., None, :, :]))
+    return Gaussian(retract(dynamics, first.mean, b), first.cov + C)
+
+
 def transition_hessian(dynamics: Dynamics, x: Array) -> Array:
     """Second derivatives of f at x, (..., n, n, n): its own, or from F, or from f."""
     if hasattr(dynamics, "hessian"):
@@ -100,3 +134,40 @@ def predict_unscented(
     W0_c, W_i = W0_c[..., None, None], W_i[..., None, None]
     P = W + W0_c * outer_sum(dY[:1], dY[:1]) + W_i * outer_sum(dY[1:], dY[1:])
     return Gaussian(mean, (P + P.mT) / 2)
+
+
+def in_parts(
+    predict: Callable[..., Gaussian], estimate: Gaussian, dynamics: Dynamics, Q: Array, **options
+) -> tuple[Gaussian, Array]:
+    """A prediction, and what the noise added to its covariance.
+
+    Parameters
+    ----------
+    predict : callable
+        One of those above.
+    estimate : Gaussian
+    dynamics : Dynamics
+    Q : array (..., n, n)
+    **options
+        Of ``predict``.
+
+    Returns
+    -------
+    tuple of Gaussian, array (..., n, n)
+        The second is the covariance of the same prediction of a state without doubt, which is made
+        along with it: f is not called again.
+    """
+    mean, cov = estimate
+    axes = max(mean.ndim + 1, cov.ndim, Q.ndim)
+    cov = cov[(None,) * (axes + 1 - cov.ndim)]
+    both = cov.__array_namespace__().concat([cov, 0 * cov])
+    mean, cov = predict(Gaussian(mean[(None,) * (axes - mean.ndim)], both), dynamics, Q, **options)
+    return Gaussian(mean[0], cov[0]), cov[1]
+
+
+PREDICTIONS = {
+    second_order: predict_second_order,
+    gaussian_second_order: predict_gaussian_second_order,
+    unscented: predict_unscented,
+}
+"""How the moments functions predict a state; all others linearise."""

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from navfilters.estimators.rule import Rule, zeros
+from navfilters.estimators.rule import Rule, finite, innovation_spread, zeros
 from navfilters.numerics import validation
 from navfilters.numerics.small_matrices import is_positive_definite, right_divide
 from navfilters.types import Array, Gaussian, Moments
@@ -85,7 +85,7 @@ class Robust(Rule):
         xp = P.__array_namespace__()
         weight = xp.asarray(self.gamma, dtype=P.dtype)[..., None, None] ** -2
         rest = xp.eye(P.shape[-1]) - weight * P
-        violated = _finite(rest) & ~is_positive_definite(rest)
+        violated = finite(rest) & ~is_positive_definite(rest)
         if self.on_violation == "raise" and xp.any(violated):
             largest = np.linalg.eigvalsh(np.asarray(P)[np.asarray(violated)])[..., -1]
             needed = np.sqrt(np.max(largest))
@@ -192,21 +192,11 @@ class AdaptiveRobust(Rule):
         assert moments is not None
         P_y = moments.P_zz
         xp = P_y.__array_namespace__()
-        P_y_bar = y[..., :, None] * y[..., None, :]
-        if memory.P_y_bar is not None:
-            rho = xp.asarray(self.rho)[..., None, None]
-            first = xp.isnan(memory.P_y_bar)
-            P_y_bar = xp.where(first, P_y_bar, (rho * memory.P_y_bar + P_y_bar) / (rho + 1))
+        P_y_bar = innovation_spread(memory.P_y_bar, y, self.rho)
         excess = P_y - xp.asarray(self.alpha)[..., None, None] * P_y_bar
-        robust = _finite(excess) & ~is_positive_definite(excess)
+        robust = finite(excess) & ~is_positive_definite(excess)
         lam = self.lam(P_y_bar, P_y) if callable(self.lam) else xp.asarray(self.lam)
         clipped = robust & (lam < 1)
         scale = xp.where(robust & (lam > 1), lam, 1.0)[..., None, None]
         counted = (memory.robust + robust, memory.clipped + clipped)
         return Gaussian(prior.mean, scale * prior.cov), AdaptiveRobustMemory(P_y_bar, *counted)
-
-
-def _finite(A: Array) -> Array:
-    """Members without a NaN or an infinity."""
-    xp = A.__array_namespace__()
-    return xp.all(xp.isfinite(A), axis=(-2, -1))

@@ -7,12 +7,12 @@ import numpy as np
 
 from navfilters.estimators import model_parts
 from navfilters.numerics import validation
-from navfilters.numerics.matrix_roots import keep_exact
+from navfilters.numerics.matrix_roots import keep_exact, semidefinite_root
 from navfilters.numerics.small_matrices import WRITTEN_OUT, matmul, right_divide
 from navfilters.types import Array, Gaussian, Moments
 
-Form = Literal["joseph", "short"]
-FORMS = ("joseph", "short")
+Form = Literal["joseph", "short", "sqrt"]
+FORMS = ("joseph", "short", "sqrt")
 
 COMPLETE: ContextVar[bool] = ContextVar("COMPLETE", default=False)
 """Whether whoever traces an update knows that all components were measured: a sixth of its time."""
@@ -34,8 +34,9 @@ def kalman_update(
         The measurement; NaN where it was not measured, which leaves the state as it is.
     moments : Moments
         What the filter expected of it.
-    form : {"joseph", "short"}
-        "short" is that of the equations, whatever the moments have.
+    form : {"joseph", "short", "sqrt"}
+        "short" is that of the equations, whatever the moments have. "sqrt" triangularises
+        [[R^1/2, H P^1/2], [0, P^1/2]] and needs a semidefinite R: NaN elsewhere.
     model : MeasurementModel, optional
         Where ``residual`` and ``retract`` come from; by default z - z_hat and x + dx.
 
@@ -51,11 +52,14 @@ def kalman_update(
 
     Notes
     -----
-    Both forms are one covariance; their rounding is not. The symmetric part is taken.
+    All forms are one covariance; their rounding is not. The symmetric part is taken. "sqrt" returns
+    a product of a factor and its transpose, but the next update takes the root again: it cannot
+    lose its definiteness by a subtraction, and it has no more digits than P has.
 
     References
     ----------
-    perea2007, Eqs. (5)-(7); pogorelsky2020, Eqs. (38), (39) for Joseph's.
+    perea2007, Eqs. (5)-(7); pogorelsky2020, Eqs. (38), (39) for Joseph's; kaminski1971 for the
+    array.
     """
     z = validation.given("z", z)
     fit(prior, z, moments)
@@ -120,17 +124,74 @@ def correct(
     xp = moments.P_zz.__array_namespace__()
     if gone is not None:
         y, moments = xp.where(gone, 0.0, y), measured(moments, gone)
-    K = gain(moments)
+    if form == "sqrt":
+        K, cov = by_array(prior.cov, moments)
+    else:
+        K = gain(moments)
+        if form == "joseph" and moments.H is not None:
+            cov = covariance_after(prior.cov, K, moments, form)
+        else:
+            reduction = matmul(K, moments.P_xz.mT)
+            cov = prior.cov - (reduction + reduction.mT) / 2
     mean = model_parts.retract(model, prior.mean, matmul(K, y[..., None])[..., 0])
+    return Gaussian(mean, cov if moments.exact is None else keep_exact(cov, moments.exact))
+
+
+def covariance_after(P: Array, K: Array, moments: Moments, form: Form) -> Array:
+    """The covariance after an update by any gain K, also by one that is not these moments'."""
+    if form == "sqrt":
+        H, root, noise_root = _factors(P, moments)
+        A = join([root - matmul(K, matmul(H, root)), matmul(K, noise_root)], -1)
+        return matmul(A, A.mT)
     if form == "joseph" and moments.H is not None:
+        xp = K.__array_namespace__()
         rest = xp.eye(K.shape[-2]) - matmul(K, moments.H)
-        cov = matmul(matmul(rest, prior.cov), rest.mT) + matmul(matmul(K, moments.R), K.mT)
-        return Gaussian(mean, (cov + cov.mT) / 2)
-    reduction = matmul(K, moments.P_xz.mT)
-    cov = prior.cov - (reduction + reduction.mT) / 2
-    if moments.exact is not None:
-        cov = keep_exact(cov, moments.exact)
-    return Gaussian(mean, cov)
+        cov = matmul(matmul(rest, P), rest.mT) + matmul(matmul(K, moments.R), K.mT)
+    else:
+        reduction = matmul(K, moments.P_xz.mT)
+        cov = P - reduction - reduction.mT + matmul(matmul(K, moments.P_zz), K.mT)
+    return (cov + cov.mT) / 2
+
+
+def by_array(P: Array, moments: Moments) -> tuple[Array, Array]:
+    """Gain and covariance after the update, from one triangular factor."""
+    H, root, noise_root = _factors(P, moments)
+    xp, m = P.__array_namespace__(), H.shape[-2]
+    zero = xp.zeros((root.shape[-1], m))
+    before = join([join([noise_root, matmul(H, root)], -1), join([zero, root], -1)], -2)
+    after = xp.linalg.qr(before.mT).R.mT
+    K = right_divide(after[..., m:, :m], after[..., :m, :m])
+    return K, matmul(after[..., m:, m:], after[..., m:, m:].mT)
+
+
+def _factors(P: Array, moments: Moments) -> tuple[Array, Array, Array]:
+    """H, P^1/2 and R^1/2."""
+    H, R = affine(P, moments)
+    return H, semidefinite_root(P)[0], semidefinite_root(R)[0]
+
+
+def affine(P: Array, moments: Moments) -> tuple[Array, Array]:
+    """H and R with P_xz = P H^T and P_zz = H P H^T + R: the moments' own, or by regression."""
+    if moments.H is not None:
+        return moments.H, moments.R
+    root, exact = semidefinite_root(P)
+    cross = moments.P_xz.mT
+    if exact is not None:  # what follows from other states has no column of its own
+        xp = P.__array_namespace__()
+        follows = xp.linalg.diagonal(exact) == 0
+        either = follows[..., :, None] | follows[..., None, :]
+        root = xp.where(either, xp.eye(P.shape[-1]), root)
+        cross = xp.where(follows[..., None, :], 0.0, cross)
+    H = right_divide(right_divide(cross, root.mT), root)
+    R = moments.P_zz - matmul(H, moments.P_xz)
+    return H, (R + R.mT) / 2
+
+
+def join(parts: list[Array], axis: int) -> Array:
+    """Matrices side by side or one below the other, with all the batch axes of all."""
+    xp = parts[0].__array_namespace__()
+    batch = xp.broadcast_shapes(*(A.shape[:-2] for A in parts))
+    return xp.concat([xp.broadcast_to(A, (*batch, *A.shape[-2:])) for A in parts], axis=axis)
 
 
 def gain(moments: Moments) -> Array:

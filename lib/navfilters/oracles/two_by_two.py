@@ -10,7 +10,7 @@ except ImportError:
 
 
 def add(a, b, factor=1):
-    """The symmetric matrix a + factor * b."""
+    """The matrix a + factor * b, entry by entry."""
     return tuple(u + factor * v for u, v in zip(a, b, strict=True))
 
 
@@ -59,3 +59,46 @@ def spread_through(h, p):
     xz21, xz22 = p12 * a + p22 * b, p12 * c + p22 * d
     hph = (a * xz11 + b * xz21, a * xz12 + b * xz22, c * xz12 + d * xz22)
     return hph, (xz11, xz12, xz21, xz22)
+
+
+def full(p):
+    """The general matrix of a symmetric one."""
+    return p[0], p[1], p[1], p[2]
+
+
+def symmetric(a):
+    """The symmetric part of a general matrix."""
+    return a[0], (a[1] + a[2]) / 2, a[3]
+
+
+def transposed(a):
+    """A^T of a general matrix."""
+    return a[0], a[2], a[1], a[3]
+
+
+def product(a, b):
+    """A B of general matrices."""
+    return (
+        a[0] * b[0] + a[1] * b[2],
+        a[0] * b[1] + a[1] * b[3],
+        a[2] * b[0] + a[3] * b[2],
+        a[2] * b[1] + a[3] * b[3],
+    )
+
+
+def applied(a, v):
+    """A v of a general matrix and a vector."""
+    return a[0] * v[0] + a[1] * v[1], a[2] * v[0] + a[3] * v[1]
+
+
+def inverse(p):
+    """P^-1 of a symmetric matrix."""
+    p11, p12, p22 = p
+    det = p11 * p22 - p12 * p12
+    return p22 / det, -p12 / det, p11 / det
+
+
+def general_inverse(a):
+    """A^-1 of a general matrix."""
+    det = a[0] * a[3] - a[1] * a[2]
+    return a[3] / det, -a[1] / det, -a[2] / det, a[0] / det

@@ -12,6 +12,7 @@ from navfilters.book.plotting.curves import (
     sweep_panels,
 )
 from navfilters.book.plotting.drawings import block_diagram, coastlines, map_panels
+from navfilters.book.plotting.matrices import honesty_matrix
 from navfilters.book.plotting.spreads import nees_tails, nine_errors
 from navfilters.book.plotting.styles import (
     BOUND,
@@ -19,6 +20,7 @@ from navfilters.book.plotting.styles import (
     MEASUREMENT,
     ROBUST,
     SECOND_ORDER,
+    STATIONS,
     STYLES,
     TRUTH,
     UKF,
@@ -31,6 +33,7 @@ __all__ = [
     "MEASUREMENT",
     "ROBUST",
     "SECOND_ORDER",
+    "STATIONS",
     "STYLES",
     "TRUTH",
     "UKF",
@@ -41,6 +44,7 @@ __all__ = [
     "ellipse",
     "ellipse_points",
     "error_axes",
+    "honesty_matrix",
     "label_ends",
     "map_panels",
     "mark_failures",

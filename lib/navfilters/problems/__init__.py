@@ -1,0 +1,40 @@
+"""Patients for filters, cures for them, and what became of each pair."""
+
+from navfilters.problems.catalogue import problems
+from navfilters.problems.cures import CURES, Cure, UnfitError
+from navfilters.problems.evaluations import evaluations
+from navfilters.problems.noisier import Noisier
+from navfilters.problems.outcome import Outcome, treat
+from navfilters.problems.problem import LOST, Draw, Problem
+from navfilters.problems.reading import Row, best, elsewhere, own, reasons, rows
+from navfilters.problems.static_fix import static_fix
+from navfilters.problems.stored import RUNS, read
+from navfilters.problems.table import Cell, cells, table
+from navfilters.problems.units import in_units
+
+__all__ = [
+    "CURES",
+    "LOST",
+    "RUNS",
+    "Cell",
+    "Cure",
+    "Draw",
+    "Noisier",
+    "Outcome",
+    "Problem",
+    "Row",
+    "UnfitError",
+    "best",
+    "cells",
+    "elsewhere",
+    "evaluations",
+    "in_units",
+    "own",
+    "problems",
+    "read",
+    "reasons",
+    "rows",
+    "static_fix",
+    "table",
+    "treat",
+]

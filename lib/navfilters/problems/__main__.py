@@ -1,0 +1,48 @@
+"""Compute and draw the whole table: ``python -m navfilters.problems``."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from navfilters.numerics.extras import command
+from navfilters.problems import stored
+from navfilters.problems.catalogue import problems
+from navfilters.problems.table import table
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Compute the table at its full size, and store it.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Those of the command line by default.
+    """
+    parser = argparse.ArgumentParser(description="Every cure on every patient.")
+    parser.add_argument("--runs", type=int, default=stored.RUNS, help="of each pair")
+    parser.add_argument("--workers", type=int, help="processes; one per core by default")
+    parser.add_argument("--quick", action="store_true", help="200 updates of the static fix")
+    parser.add_argument("--out", default=stored.FILE, help="file of the table")
+    chosen = parser.parse_args(arguments)
+    if chosen.runs < 2:
+        parser.error(f"--runs must be at least 2; found {chosen.runs}")
+    found = table(
+        chosen.runs,
+        patients=problems(full=not chosen.quick),
+        workers=chosen.workers,
+        progress=_bar,
+    )
+    stored.write(chosen.out, found)
+    sys.stdout.write(f"{len(found)} rows in {chosen.out}\n")
+
+
+def _bar(parts, total=None):
+    try:
+        from tqdm import tqdm
+    except ImportError:
+        return iter(parts)
+    return tqdm(parts, total=total, unit=" parts", disable=None)
+
+
+if __name__ == "__main__":
+    command(main)
