@@ -6,7 +6,7 @@ know; every correction with every kind of moments, with and without the circular
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,9 +26,9 @@ from navfilters.papers.perea2007.experiment import Setup, isotropic
 from navfilters.runs import records
 from navfilters.runs.consistency import nees
 from navfilters.runs.sweeping import sweep
-from navfilters.types import Array
+from navfilters.types import Array, Moments
 
-MOMENTS = {
+MOMENTS: dict[str, Callable[..., Moments]] = {
     "first order": linearized,
     "second order": gaussian_second_order,
     "cubature": cubature,
