@@ -95,9 +95,7 @@ def test_the_error_of_the_pixel_is_one_error_in_all_rows():
     y = SENSOR.h(one, pixel[0] + shifts) / UNIT
     wanted = (SENSOR.noise(estimate, pixel)[0] - SENSOR.R) / np.outer(UNIT, UNIT)
     assert_allclose(np.cov(y.T), wanted, atol=0.05 * np.sqrt(np.max(np.diag(wanted))) ** 2)
-    assert wanted[0, 2] < -0.9 * np.sqrt(wanted[0, 0] * wanted[2, 2]) or (
-        wanted[0, 2] > 0.9 * np.sqrt(wanted[0, 0] * wanted[2, 2])
-    )
+    assert abs(wanted[0, 2]) > 0.9 * np.sqrt(wanted[0, 0] * wanted[2, 2])
 
 
 def test_jax_computes_the_same():
@@ -119,9 +117,7 @@ def test_what_is_not_measured_is_as_if_it_had_never_been_there(kept):
         ratios=np.full((5, 2), 0.0 if 0 in kept else np.nan),
     )
     P = np.diag(SIZE**2)
-    got = FILTERS["EKF"](
-        Gaussian(estimate.x, np.broadcast_to(P, (5, 9, 9))), missing.z, SENSOR
-    )
+    got = FILTERS["EKF"](Gaussian(estimate.x, np.broadcast_to(P, (5, 9, 9))), missing.z, SENSOR)
     y, sensor = SENSOR.given(timed(pixel).z)
     H, R = sensor.jacobian(estimate.x)[:, kept], sensor.noise(estimate.x)[:, kept][:, :, kept]
     y = (y - sensor.h(estimate.x))[:, kept]
@@ -132,7 +128,7 @@ def test_what_is_not_measured_is_as_if_it_had_never_been_there(kept):
 
 
 def test_without_a_pixel_nothing_is_measured():
-    _, estimate, pixel = states()
+    pixel = states()[-1]
     y, _ = SENSOR.given(timed(pixel * np.nan).z)
     assert np.isnan(y).all()
 
@@ -146,7 +142,7 @@ def test_each_member_may_have_its_own_noise():
 
 
 def test_a_pass_gives_the_attitude_of_each_image():
-    turned = body_axes(R0, V0 + [100.0, 0, 0])
+    turned = body_axes(R0, V0 + np.array([100.0, 0, 0]))
     sensor = ZeroDoppler(SarPass(ANTENNA, np.stack([ANTENNA.T_e_b, turned])), 0.7)
     _, estimate, pixel = states()
     wanted = ZeroDoppler(replace(ANTENNA, T_e_b=turned), 0.7).h(estimate, pixel)
