@@ -149,9 +149,9 @@ def test_the_flight_without_the_antenna_is_a_table_too(monkeypatch, capsys):
         return "a table"
 
     monkeypatch.setattr(command, "antenna_table", table)
-    command.main("--without-antenna --case TC-2 --runs 3 --seed 4".split())
+    command.main(["--without-antenna", "--case", "TC-2", "--runs", "3", "--seed", "4"])
     assert asked == [("TC-2", 3, 4)]
     assert capsys.readouterr().out.endswith("a table\n")
     with pytest.raises(SystemExit):
-        command.main("--without-antenna --closed-loop".split())
+        command.main(["--without-antenna", "--closed-loop"])
     assert "--without-antenna is open-loop" in capsys.readouterr().err
