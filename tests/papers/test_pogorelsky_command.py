@@ -139,3 +139,19 @@ def test_table_of_the_command(monkeypatch, capsys):
     with pytest.raises(SystemExit):
         command.main(["--closed-loop", "--runs", "1"])
     capsys.readouterr()
+
+
+def test_the_flight_without_the_antenna_is_a_table_too(monkeypatch, capsys):
+    asked = []
+
+    def table(case, runs, seed, progress):
+        asked.append((case, runs, seed))
+        return "a table"
+
+    monkeypatch.setattr(command, "antenna_table", table)
+    command.main(["--without-antenna", "--case", "TC-2", "--runs", "3", "--seed", "4"])
+    assert asked == [("TC-2", 3, 4)]
+    assert capsys.readouterr().out.endswith("a table\n")
+    with pytest.raises(SystemExit):
+        command.main(["--without-antenna", "--closed-loop"])
+    assert "--without-antenna is open-loop" in capsys.readouterr().err

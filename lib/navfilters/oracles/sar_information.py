@@ -7,6 +7,7 @@ true flight, by the differences of ``sar_trn``; nothing of ours is imported but 
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,14 +60,14 @@ def all_images(flown: Sequence[Any]) -> list[Image]:
     for interval, r, v in zip(flown, rs, vs, strict=True):
         T = again.attitude(r[1], v[1])
         pixel = again.ellipsoid_hit(r[1], T[2])
-        J = again.difference(lambda e, a=(r[1], v[1], T, pixel): _rows(*a, e), STEPS)
+        J = again.difference(partial(_rows, r[1], v[1], T, pixel), STEPS)
         ahead = np.sum((pixel - r) * v, axis=1) / np.sqrt(np.sum(v * v, axis=1))
         sweep = (ahead[0] - ahead[2]) / (2 * h)
         found.append(Image(interval.F, interval.Q, J[:, :9], J[:, 9:], sweep))
     return found
 
 
-def _rows(r, v, T, pixel, e):
+def _rows(r: Any, v: Any, T: Any, pixel: Any, e: np.ndarray) -> np.ndarray:
     v, d = v + e[3:6], pixel + e[9:] - r - e[:3]
     s, speed = again.misalignment(e[6:9]) @ T @ d, np.sqrt(v @ v)
     return np.array([s[0] / s[2], s[1] / s[2], d @ v / speed, np.sqrt(d @ d), speed])
@@ -127,30 +128,28 @@ def all_at_once(
     float
     """
     rows, D = list(rows), again.geolocation_covariance()
-    size = 9 * (1 + len(images)) + 1  # the last one is the offset's
-    B, information = np.zeros((9, size)), np.eye(size)
-    more, pulled = np.zeros((size, size)), np.zeros(size)
+    B = np.zeros((9, 9 * (1 + len(images)) + 1))  # the last number is the offset's
     B[:, :9] = np.sqrt(setup.P0)
-    for k, seen in enumerate(images):
-        at, scale = 9 * (k + 1), np.sqrt(np.diag(seen.Q))
-        B = seen.F @ B
-        B[:, at : at + 9] = scale[:, None] * np.linalg.cholesky(seen.Q / np.outer(scale, scale))
-        A = seen.H @ B
-        A[2, -1] = seen.sweep * offset
-        own = [pointing, pointing, seen.sweep * clock, setup.sigma_range, setup.sigma_speed]
-        R = np.diag(np.square(own)) + seen.H_f @ D @ seen.H_f.T
-        A, R = A[rows], R[np.ix_(rows, rows)]
-        weight = np.linalg.solve(R, A).T
-        information += weight @ A
-        more += weight * np.square(untold)[rows] @ weight.T
-        wrong_rows = np.asarray(bias, float)
-        if drift is not None:
-            wrong_rows = wrong_rows + seen.H[:, :6] @ drift[k]
-        pulled += weight @ wrong_rows[rows]
-    through = np.linalg.solve(information, B.T).T
-    P, away = B @ through.T, through @ pulled
+    seen_by, weighed, wrong = list[np.ndarray](), list[np.ndarray](), list[np.ndarray]()
+    for k, image in enumerate(images):
+        at, scale = 9 * (k + 1), np.sqrt(np.diag(image.Q))
+        B = image.F @ B
+        B[:, at : at + 9] = scale[:, None] * np.linalg.cholesky(image.Q / np.outer(scale, scale))
+        A = image.H @ B
+        A[2, -1] = image.sweep * offset
+        own = [pointing, pointing, image.sweep * clock, setup.sigma_range, setup.sigma_speed]
+        R = np.diag(np.square(own)) + image.H_f @ D @ image.H_f.T
+        seen_by.append(A[rows])
+        weighed.append(np.linalg.solve(R[np.ix_(rows, rows)], A[rows]))
+        pushed = 0.0 if drift is None else image.H[:, :6] @ drift[k]
+        wrong.append((np.asarray(bias) + pushed)[rows])
+    W = np.concatenate(weighed)
+    through = np.linalg.solve(np.eye(B.shape[1]) + W.T @ np.concatenate(seen_by), B.T)
+    P, gain = B @ through, W @ through
+    away = np.concatenate(wrong) @ gain
     if drift is not None:
         away[:6] -= drift[-1]
-    wrong, unit = through @ more @ through.T + np.outer(away, away), np.sqrt(np.diag(P))
+    more = np.square(np.tile(np.asarray(untold, float)[rows], len(images)))
+    error, unit = gain.T * more @ gain + np.outer(away, away), np.sqrt(np.diag(P))
     scale = np.outer(unit, unit)
-    return P, 9 + float(np.trace(np.linalg.solve(P / scale, wrong / scale)))
+    return P, 9 + float(np.trace(np.linalg.solve(P / scale, error / scale)))

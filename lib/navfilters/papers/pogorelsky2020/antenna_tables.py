@@ -53,10 +53,9 @@ def antenna_table(
 
 def _jobs(case: str) -> Iterator[Job]:
     trials = {measured: Trial(measured) for measured in MEASURED}
-    for label, trial in trials.items():
-        yield f"{label}, 3 images", partial(_flown, case, trial, 3)
-    for label, trial in trials.items():
-        yield f"{label}, 72 images", partial(_flown, case, trial, 72)
+    for updates in (3, 72):
+        for measured, trial in trials.items():
+            yield f"{measured}, {updates} images", partial(_flown, case, trial, updates)
     for clock in (1e-3, 1e-2, 1e-1, 1.0):
         yield f"plane, clock {1e3 * clock:g} ms", partial(_flown, case, Trial(clock=clock), 72)
     for measured in MEASURED:
@@ -64,20 +63,20 @@ def _jobs(case: str) -> Iterator[Job]:
         if measured != "antenna":
             yield f"{measured}, 1 ms late", partial(_flown, case, late, 72)
         for arcseconds, told in ((5, False), (20, False), (20, True)):
-            label = f"{measured}, {arcseconds} arcsec{', told' if told else ''}"
+            name = f"{measured}, {arcseconds} arcsec{', told' if told else ''}"
             trial = Trial(measured, pointing=arcseconds, told=told)
-            yield label, partial(_flown, case, trial, 72)
+            yield name, partial(_flown, case, trial, 72)
         air = Trial(measured, delay=3.08)
         yield f"{measured}, delay of 3.08 m", partial(_flown, case, air, 72)
         yield f"{measured}, delay a state", partial(_with_delay, case, air, 3.0)
     for sigma in (0.3, 1.0, 3.0):
-        label = f"antenna, tenth state {sigma} m"
-        yield label, partial(_with_delay, case, Trial("antenna"), sigma)
+        name = f"antenna, tenth state {sigma} m"
+        yield name, partial(_with_delay, case, Trial("antenna"), sigma)
     for updates in (10, 72):
         for bump in (0.2, 0.5, 1.0, 2.0):
             setup = replace(of_case(case), underweighting=bump, underweighted=updates)
-            label = f"antenna, bump {bump} in {updates}"
-            yield label, partial(_flown, setup, Trial("antenna"), 72)
+            name = f"antenna, bump {bump} in {updates}"
+            yield name, partial(_flown, setup, Trial("antenna"), 72)
 
 
 def _flown(case, trial: Trial, updates: int, runs: list[int], seed: int) -> tuple[Array, Array]:

@@ -169,7 +169,7 @@ def monte_carlo(
     seed: int = 0,
     *,
     flight: Truth | None = None,
-    measure: Callable[[int, NavigationState], Measurement] | None = None,
+    measure: Callable[[int, NavigationState], Any] | None = None,
     estimator: Any = None,
     sensor: Any = None,
     progress: Callable[[Iterable], Iterable] = iter,
