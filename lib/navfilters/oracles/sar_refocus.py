@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-FINE = (1.0, 0.25, 0.05)
+FINE = (1.0, 0.25, 0.1)
 """Steps of the search, m/s."""
 
 
@@ -37,6 +37,12 @@ class Pixels(NamedTuple):
     slant_range: np.ndarray
     velocity: float
 
+    def faded(self, lines: int) -> "Pixels":
+        """The same, fading over so many lines at both ends as (1 - cos) / 2."""
+        rise = (1 - np.cos(np.pi * (np.arange(lines) + 0.5) / lines)) / 2
+        weight = np.concatenate([rise, np.ones(len(self.values) - 2 * lines), rise[::-1]])
+        return self._replace(values=(self.values * weight[:, None]).astype(np.complex64))
+
     def spectrum(self, faster: float) -> tuple[np.ndarray, np.ndarray]:
         """Doppler frequencies (lines, 1), Hz, and the azimuth spectrum for another velocity."""
         f = np.fft.fftfreq(len(self.values), 1 / self.prf)[:, None]
@@ -60,7 +66,7 @@ def order(p: Pixels, faster: float) -> float:
 
 
 def agreement(p: Pixels, faster: float) -> float:
-    """Product of the intensities of two looks, of negative and of positive frequencies, as they lie.
+    """Product of the intensities of two looks, of negative and of positive frequencies.
 
     Its maximum over the velocity is where the looks' pictures fall on each other.
     """
@@ -68,6 +74,9 @@ def agreement(p: Pixels, faster: float) -> float:
     looks = [np.abs(np.fft.ifft(spectrum * side, axis=0)) ** 2 for side in (f < 0, f > 0)]
     a, b = (g - g.mean(axis=0) for g in looks)
     return float(np.sum(a * b))
+
+
+CRITERIA = (contrast, order, agreement)
 
 
 def best(criterion: Callable[[Pixels, float], float], p: Pixels, reach: float = 4.0) -> float:

@@ -54,6 +54,11 @@ def cut_blocks(image: Image, lines: int, samples: int) -> list[Image]:
     ]
 
 
+FADE = 32
+"""Lines at a block's ends over which it fades: or else what moves across an end, out of focus,
+weighs in the entropy as much as what loses its focus."""
+
+
 class BlockCurves(NamedTuple):
     """What three autofocuses see of each block at each assumed velocity.
 
@@ -81,7 +86,7 @@ def block_curves(
     samples: int,
     progress: Callable[[Iterable], Iterable] = iter,
 ) -> BlockCurves:
-    """Focus at each velocity once, and look at each block.
+    """Focus at each velocity once, and look at each block, which fades towards its ends.
 
     Parameters
     ----------
@@ -98,11 +103,14 @@ def block_curves(
     BlockCurves
     """
     gain = acquired.effective(acquired.speed + 0.5) - acquired.effective(acquired.speed - 0.5)
+    inwards = np.minimum(np.arange(lines), np.arange(lines)[::-1]) + 0.5
+    window = np.sin(np.pi / 2 * np.minimum(inwards / FADE, 1.0)).astype(np.float32) ** 2
     rows = list[list[tuple[float, float, float]]]()
     for each in progress(offset):
         velocity = acquired.effective(acquired.speed + float(each))
         row = list[tuple[float, float, float]]()
-        for block in cut_blocks(acquired.focuser.image(velocity, acquired.slope), lines, samples):
+        for sharp in cut_blocks(acquired.focuser.image(velocity, acquired.slope), lines, samples):
+            block = sharp._replace(pixels=sharp.pixels * window[:, None])
             intensity = block.pixels.real**2 + block.pixels.imag**2
             error = drift_to_velocity(
                 look_drift(block), velocity, block.centre_range, acquired.focuser.wavelength

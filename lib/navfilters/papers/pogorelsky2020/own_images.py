@@ -29,9 +29,9 @@ from navfilters.sar.raw.radar import PALSAR
 SHORT_PULSE = replace(PALSAR, pulse_length=4e-6)
 """PALSAR with a seventh of its pulse, at the same noise: the same images, of less raw data."""
 
-OFFSETS = np.r_[-28:-4:4.0, -4.0, -3.0, -2.0:2.5:0.5, 3.0, 4.0, 8:29:4.0]
-"""Assumed minus true velocity at which an image is looked at, m/s: three deviations of the first
-estimate to either side."""
+OFFSETS = np.r_[-32:-7:6.0, -4.0, -3.0, -2.0:2.5:0.5, 3.0, 4.0, 8:33:6.0]
+"""Assumed minus true velocity at which an image is looked at, m/s: closest where
+peaks are."""
 
 REACH = 0.06
 """By which terrain is moved at most, either way, deg; the tile has 0.14."""
@@ -40,7 +40,7 @@ WHOLE = Imaging(radar=SHORT_PULSE, lines=1024, samples=512, half_width=2288.0)
 """Of the command: a quarter of the library's size of an image."""
 
 
-class Formed(NamedTuple):
+class Sighting(NamedTuple):
     """One image, looked at: what a loop needs of it.
 
     Parameters
@@ -57,7 +57,7 @@ class Formed(NamedTuple):
 
 def look_at(
     k: int, imaging: Imaging, lines: int, samples: int, offset: np.ndarray = OFFSETS
-) -> Formed:
+) -> Sighting:
     """Simulate an image, focus it at each velocity, and match it block by block.
 
     Parameters
@@ -72,11 +72,11 @@ def look_at(
 
     Returns
     -------
-    Formed
+    Sighting
     """
     acquired = acquire(same_images(CASES["TC-1"]), k, imaging)
     curves = block_curves(acquired, offset, lines, samples)
-    return Formed(acquired, curves, match_blocks(acquired, imaging, lines, samples))
+    return Sighting(acquired, curves, match_blocks(acquired, imaging, lines, samples))
 
 
 def own_tables(
@@ -107,9 +107,9 @@ def own_tables(
                 rng = np.random.default_rng([imaging.seed, k, run, 3])
                 north, east = rng.uniform(-REACH, REACH, 2)
                 own = replace(imaging, seed=1000 + run, moved=(float(north), float(east)))
-                formed = look_at(k, own, imaging.lines, imaging.samples)
-                found["variance"][-1] += block_tables(*formed, "variance")
-                found["entropy"][-1] += block_tables(*formed, "entropy")
+                sighting = look_at(k, own, imaging.lines, imaging.samples)
+                found["variance"][-1] += block_tables(*sighting, "variance")
+                found["entropy"][-1] += block_tables(*sighting, "entropy")
                 done(1)
     return found
 

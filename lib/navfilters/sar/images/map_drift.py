@@ -11,6 +11,9 @@ from navfilters.sar.images.focuser import Focuser
 from navfilters.sar.images.slant_image import Image
 from navfilters.types import Array
 
+FINER = 8
+"""Places of the correlation for each line, before a parabola."""
+
 
 class Drift(NamedTuple):
     """How far two looks of an image lie apart.
@@ -65,12 +68,12 @@ def look_drift(image: Image, doppler_centroid: float = 0.0) -> Drift:
         look = fft.ifft(spectrum * half[:, None], axis=0, workers=2)
         intensity = look.real**2 + look.imag**2
         looks.append(fft.rfft(intensity - intensity.mean(axis=0), axis=0, workers=2))
-    both = fft.irfft(np.sum(np.conj(looks[0]) * looks[1], axis=1), lines)
+    both = fft.irfft(np.sum(np.conj(looks[0]) * looks[1], axis=1), FINER * lines)
     best = int(np.argmax(both))
-    before, here, after = (float(both[(best + i) % lines]) for i in (-1, 0, 1))
+    before, here, after = (float(both[(best + i) % len(both)]) for i in (-1, 0, 1))
     curved = before - 2 * here + after
     place = best + (0.5 * (before - after) / curved if curved < 0 else 0.0)
-    place = (place + lines / 2) % lines - lines / 2
+    place = (place / FINER + lines / 2) % lines - lines / 2
     return Drift(place / image.prf, means[1] - means[0])
 
 
