@@ -106,29 +106,29 @@ class ManoeuvringOrbit:
         -------
         array (..., n)
         """
-        xp = x.__array_namespace__()
         v, rest = x[..., 3:6], x[..., 6:]
         acceleration = self.gravity.acceleration(x[..., :3])
         if fires and self.thrust != "none":
             push = rest
             if self.thrust == "strength":
-                push = rest * v / xp.sqrt(dot(v, v))[..., None]
+                push = rest * v / np.sqrt(dot(v, v))[..., None]
             acceleration = acceleration + push
-        return xp.concat([v, acceleration, -rest / self.memory], axis=-1)
+        return np.concatenate([v, acceleration, -rest / self.memory], axis=-1)
 
     def jacobian(self, x: Array, fires: bool) -> Array:
         """A = d(dx/dt)/dx, (..., n, n)."""
-        xp = x.__array_namespace__()
-        E = np.eye(x.shape[-1])
-        E_r, E_v, E_a = E[:3], E[3:6], E[6:]
-        of_x = self.gravity.gradient(x[..., :3]) @ E_r
+        n = x.shape[-1]
+        A = np.zeros((*x.shape[:-1], n, n))
+        A[..., :3, 3:6] = np.eye(3)
+        A[..., 3:6, :3] = self.gravity.gradient(x[..., :3])
+        A[..., 6:, 6:] = -np.eye(n - 6) / self.memory
         if fires and self.thrust == "vector":
-            of_x = of_x + E_a
+            A[..., 3:6, 6:] = np.eye(3)
         if fires and self.thrust == "strength":
             v = x[..., 3:6]
-            u = v / xp.sqrt(dot(v, v))[..., None]
-            of_x = of_x + along_velocity(v, x[..., 6]) @ E_v + u[..., None] * E_a
-        return E_r.T @ E_v + E_v.T @ of_x - E_a.T @ E_a / self.memory
+            A[..., 3:6, 3:6] = along_velocity(v, x[..., 6])
+            A[..., 3:6, 6] = v / np.sqrt(dot(v, v))[..., None]
+        return A
 
     def f(self, x: Array) -> Array:
         """The state at the interval's end, (..., n)."""
@@ -213,9 +213,8 @@ def manoeuvring(
 
 def _middle(x: Array, x_next: Array, h: float) -> Array:
     """Half a step on."""
-    xp = x.__array_namespace__()
     rest = (x[..., 6:] + x_next[..., 6:]) / 2
-    return xp.concat([middle(x[..., :6], x_next[..., :6], h), rest], axis=-1)
+    return np.concatenate([middle(x[..., :6], x_next[..., :6], h), rest], axis=-1)
 
 
 def _summed(Q: Array, A: Array, h: float) -> Array:

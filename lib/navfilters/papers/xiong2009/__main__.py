@@ -1,4 +1,5 @@
-"""Table 1: ``python -m navfilters.papers.xiong2009 --variant B --seeds 20``."""
+"""Table 1: ``python -m navfilters.papers.xiong2009 --variant B --seeds 20``; with ``--rivals`` the
+fair comparison."""
 
 import argparse
 import sys
@@ -9,6 +10,7 @@ import numpy as np
 from navfilters.numerics.extras import command
 from navfilters.papers.xiong2009.experiment import ESTIMATORS, VARIANTS
 from navfilters.papers.xiong2009.monte_carlo import rms_error
+from navfilters.papers.xiong2009.rivals import AFTER, BURNS, END, RIVALS, course, fly_rival
 from navfilters.runs.progress import progress as progress_bar
 
 
@@ -43,8 +45,42 @@ def table(
     return "\n".join(lines)
 
 
+def comparison(
+    variant: str = "A",
+    seeds: Sequence[int] = range(24),
+    *,
+    progress: Callable[[Iterable], Iterable] = iter,
+) -> str:
+    """The paper's filters and their rivals: RMS errors over seeds, m, and mean NEES.
+
+    Parameters
+    ----------
+    variant : {"A", "B", "C", "D"}
+    seeds : sequence of int
+    progress : callable
+        Wraps the iterable of rivals.
+
+    Returns
+    -------
+    str
+        One line for each rival: errors through the burns, in the last 2000 s, and without burns
+        (where those that are told of burns expect them); mean NEES of the same.
+    """
+    setup = VARIANTS[variant]
+    flights = course(setup, seeds)
+    columns = ("burns (m)", "end (m)", "quiet (m)", "NEES", "NEES", "NEES")
+    lines = [f"{'':26}" + "".join(f"{column:>12}" for column in columns)]
+    for name, rival in progress(RIVALS.items()):
+        flown = fly_rival(rival, flights, setup)
+        places = ((BURNS, 0), (END, 0), (AFTER, 1))
+        row = [flown.rms(updates)[0, k] for updates, k in places]
+        row += [np.mean(flown.nees[updates, 0, k]) for updates, k in places]
+        lines.append(f"{name:26}" + "".join(f"{x:12.4g}" for x in row))
+    return "\n".join(lines)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Print Table 1.
+    """Print Table 1, or the comparison.
 
     Parameters
     ----------
@@ -54,10 +90,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description="Table 1 of Xiong, Zhang and Liu (2009).")
     parser.add_argument("--variant", choices=sorted(VARIANTS), default="A", help="noise reading")
     parser.add_argument("--seeds", type=int, default=20, help="number of runs")
+    parser.add_argument("--rivals", action="store_true", help="other filters beside the paper's")
     chosen = parser.parse_args(arguments)
     if chosen.seeds < 1:
         parser.error(f"--seeds must be at least 1; found {chosen.seeds}")
-    text = table(chosen.variant, range(chosen.seeds), progress=progress_bar)
+    text = (comparison if chosen.rivals else table)(
+        chosen.variant, range(chosen.seeds), progress=progress_bar
+    )
     sys.stdout.write(f"variant {chosen.variant}, {chosen.seeds} seeds\n{text}\n")
 
 

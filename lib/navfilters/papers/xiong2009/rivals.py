@@ -130,8 +130,8 @@ RIVALS = {
     "timed thrust vector": Rival(told=True, thrust="vector", q_a=0.01),
     "timed strength": Rival(told=True, thrust="strength"),
 }
-"""The paper's filters and others, each with one parameter tuned by the error at the end in reading A
-(the chapter on fair comparisons shows the scans)."""
+"""The paper's filters and others, each with one parameter tuned in reading A by the error at the
+end; the chapter on fair comparisons shows the scans."""
 
 
 def course(
