@@ -49,7 +49,7 @@ def test_one_unit_for_all_components_changes_nothing():
 
 
 def test_the_matrix_of_the_adaptive_filter_has_units():
-    """Q is turned by exp(A M A^T / 2): no matter how long a metre is, but velocities need one unit."""
+    """Q is turned by exp(A M A^T / 2), of velocities alone, which need one unit."""
     rule, rng = AdaptiveNoise(N=3, k=1), np.random.default_rng(0)
     memory = rule.init(Gaussian(np.zeros(6), np.eye(6)))
     full = memory._replace(innovations=rng.standard_normal((4, 2)), count=np.array(4))

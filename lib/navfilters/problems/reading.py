@@ -150,7 +150,7 @@ def listing(found: Sequence[Row]) -> str:
     paragraphs = []
     for row in found:
         pairs = [
-            f"{cell.problem}: {cell.reason and 'cannot act' or _pair(cell, words[cell.honest])}"
+            f"{cell.problem}: {'cannot act' if cell.reason else _pair(cell, words[cell.honest])}"
             for cell in row.cells
         ]
         paragraphs.append(
