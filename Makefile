@@ -5,8 +5,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 BUILT := _build/.complete
 BENCH := .venv-bench
-SOURCES := $(shell find book lib -type f -not -path '*/__pycache__/*' -not -name '.*' 2>/dev/null) \
-	_config.yml _toc.yml requirements.txt tools/execute_notebooks.py tools/executed.py
+SOURCES := $(shell find book lib -type f -not -path '*/__pycache__/*' -not -name '.*' -not -path '*/thumbnails/*' 2>/dev/null) \
+	_config.yml _toc.yml requirements.txt tools/execute_notebooks.py tools/executed.py tools/thumbnails.py
 
 # Everything runs in .venv, with .venv's settings: what the shell has of packages (ROS sets PYTHONPATH),
 # start-up files, kernels named python3, styles and pip options stays outside.
@@ -48,6 +48,7 @@ book: $(BUILT)  ## execute every notebook and build the HTML; warnings are error
 $(BUILT): $(SOURCES) $(VENV)/.book
 	rm -rf _build/html _build/.jupyter_cache
 	$(BIN)/python tools/execute_notebooks.py
+	$(BIN)/python tools/thumbnails.py
 	$(BIN)/jupyter-book build . --warningiserror --nitpick --keep-going
 	@touch $@
 

@@ -173,3 +173,23 @@ def test_a_cell_with_a_caption_shows_its_figure_alone(path):
     captioned = [c for c in code_cells(path) if "figure" in c.metadata.get("mystnb", {})]
     shown = [[o for o in c.outputs if o.output_type != "stream"] for c in captioned]
     assert [c.id for c, found in zip(captioned, shown, strict=True) if len(found) != 1] == []
+
+
+@every_notebook
+def test_solutions_are_folded_in_code_and_in_words(path):
+    """From the exercises on a reader sees questions only."""
+    cells = nbformat.read(path, as_version=4).cells
+    begins = [i for i, c in enumerate(cells) if "## Exercises" in c.source]
+    for cell in cells[begins[0] + 1 :] if begins else ():
+        if cell.cell_type == "code":
+            assert "hide-cell" in cell.metadata.get("tags", [])
+            continue
+        seen = re.sub(r":::\{dropdown\} The answer\n.*?\n:::", "", cell.source, flags=re.DOTALL)
+        assert all(re.match(r"\d+\. ", part) for part in seen.strip().split("\n\n") if part)
+
+
+@every_notebook
+def test_a_page_does_not_open_with_its_imports(path):
+    first = code_cells(path)[0]
+    if first.source.startswith(("import ", "from ")):
+        assert {"hide-input", "remove-input"} & set(first.metadata.get("tags", []))

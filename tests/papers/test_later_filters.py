@@ -10,10 +10,10 @@ from navfilters.papers.perea2007 import Setup, later_filters
 
 def test_runs_are_those_of_the_oracle():
     setup = Setup()
-    z = later_filters.measurements(setup, 20, 10)
-    got = later_filters.follow(LATER_FILTERS["RC-EKF"], setup, z, (1, 10))
+    given = later_filters.experiment(setup, 20, 10)
+    got = later_filters.follow(LATER_FILTERS["RC-EKF"], setup, given, (1, 10))
     R = setup.range_variance, setup.bearing_variance
-    mean, cov = oracle.runs("RC-EKF", setup.x0, setup.sigma, R, z)
+    mean, cov = oracle.runs("RC-EKF", given.start.T, setup.sigma, R, given.z)
     error = mean[[0, 9]] - setup.x_true
     square = np.einsum("kri,krij,krj->kr", error, np.linalg.inv(cov[[0, 9]]), error)
     np.testing.assert_allclose(got.error, np.linalg.norm(error, axis=-1), rtol=1e-6)

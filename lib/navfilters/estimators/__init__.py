@@ -24,6 +24,7 @@ from navfilters.estimators.state import FilterState
 from navfilters.estimators.strong_tracking import StrongTracking
 from navfilters.estimators.update import kalman_update
 from navfilters.estimators.variants import (
+    Underweighting,
     bump_circular,
     bump_equivalent,
     bump_linear,
@@ -48,6 +49,7 @@ __all__ = [
     "Rule",
     "SigmaPoints",
     "StrongTracking",
+    "Underweighting",
     "VariationalNoise",
     "as_filter",
     "bump_circular",

@@ -268,7 +268,7 @@ def history(name, x0, sigma, R, z, *, steps=1000, digits=60, keep=None, **option
 
 
 def runs(name, x0, sigma, R, z, **options):
-    """As `history`, of many runs in doubles, with measurements z (steps, runs, 2).
+    """As `history`, of many runs in doubles: z (steps, runs, 2); x0 of numbers or arrays (runs,).
 
     Returns
     -------
@@ -277,7 +277,7 @@ def runs(name, x0, sigma, R, z, **options):
         After each measurement.
     """
     count = np.shape(z)[1]
-    x, r = (tuple(np.full(count, float(v)) for v in pair) for pair in (x0, R))
+    x, r = (tuple(np.zeros(count) + v for v in pair) for pair in (x0, R))
     p = tuple(np.full(count, float(v)) for v in (sigma**2, 0.0, sigma**2))
     means, covs = [], []
     with np.errstate(all="ignore"):

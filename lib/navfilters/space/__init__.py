@@ -17,6 +17,7 @@ from navfilters.space.gravity import EARTH, Gravity
 from navfilters.space.image_measurement import Measurement, SarGeometry
 from navfilters.space.image_sensor import Pixel, SarPass
 from navfilters.space.inertial_orbit import INTEGRATORS, Orbit
+from navfilters.space.manoeuvring_orbit import ManoeuvringOrbit, manoeuvring
 from navfilters.space.navigation_state import NavigationState
 from navfilters.space.osculating_ellipse import perigee_apogee
 from navfilters.space.pose import difference, retract
@@ -31,6 +32,7 @@ from navfilters.space.quaternions import (
 )
 from navfilters.space.star_earth_sensor import StarEarthSensor
 from navfilters.space.thrust import COASTING, Thrust
+from navfilters.space.zero_doppler import TimedMeasurement, ZeroDoppler
 
 __all__ = [
     "COASTING",
@@ -42,6 +44,7 @@ __all__ = [
     "EarthFixedNavigation",
     "EarthFixedOrbit",
     "Gravity",
+    "ManoeuvringOrbit",
     "Measurement",
     "NavigationState",
     "Orbit",
@@ -50,6 +53,8 @@ __all__ = [
     "SarPass",
     "StarEarthSensor",
     "Thrust",
+    "TimedMeasurement",
+    "ZeroDoppler",
     "antenna_axes",
     "body_axes",
     "conjugate",
@@ -61,6 +66,7 @@ __all__ = [
     "enu_covariance",
     "from_rotation_vector",
     "geodetic_to_ecef",
+    "manoeuvring",
     "matrix",
     "normalized",
     "perigee_apogee",

@@ -55,8 +55,8 @@ class StarEarthSensor:
 
         Parameters
         ----------
-        x : array (..., 6)
-            Inertial position, m, and velocity, m/s.
+        x : array (..., n)
+            Inertial position, m, and what else the state has: velocity, m/s, at least.
 
         Returns
         -------
@@ -74,22 +74,23 @@ class StarEarthSensor:
         return atan2(xp.sqrt(dot(w, w)), -dot(u, r))
 
     def jacobian(self, x: Array) -> Array:
-        """H: across r and towards the star, 1 / norm(r) long; zero for the velocity.
+        """H: across r and towards the star, 1 / norm(r) long; zero for all but the position.
 
         H_i = r x (u_i x r) / (norm(r)^2 norm(u_i x r))
 
         Parameters
         ----------
-        x : array (..., 6)
+        x : array (..., n)
 
         Returns
         -------
-        array (..., m, 6)
-            rad/m, then rad s/m.
+        array (..., m, n)
+            rad/m, then rad s/m and so on.
         """
         xp = x.__array_namespace__()
-        u_r, towards, _, r, _ = self._axes(x)
-        return xp.concat([towards / r, xp.zeros_like(u_r)], axis=-1)
+        _, towards, _, r, _ = self._axes(x)
+        rest = xp.zeros_like(towards[..., :1]) * xp.ones(x.shape[-1] - 3)
+        return xp.concat([towards / r, rest], axis=-1)
 
     def hessian(self, x: Array) -> Array:
         """Second derivatives of each angle, in the axes along r, towards the star, and normal n.
@@ -98,11 +99,11 @@ class StarEarthSensor:
 
         Parameters
         ----------
-        x : array (..., 6)
+        x : array (..., n)
 
         Returns
         -------
-        array (..., m, 6, 6)
+        array (..., m, n, n)
             rad/m^2 in the block of the position; zero elsewhere.
         """
         xp = x.__array_namespace__()
@@ -110,9 +111,8 @@ class StarEarthSensor:
         pair = along[..., :, None] * towards[..., None, :]
         of_normal = normal[..., :, None] * normal[..., None, :]
         block = -(pair + pair.mT + cotangent[..., None] * of_normal) / (r * r)[..., None]
-        zero = xp.zeros_like(block)
-        top, bottom = xp.concat([block, zero], axis=-1), xp.concat([zero, zero], axis=-1)
-        return xp.concat([top, bottom], axis=-2)
+        E_r = xp.eye(x.shape[-1])[:3]
+        return E_r.mT @ block @ E_r
 
     def _axes(self, x: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Unit vectors along r, towards the star and normal to both, norm(r) and cot(theta)."""

@@ -78,3 +78,13 @@ def test_the_bound_is_that_of_a_plain_loop_over_the_seconds(thrust):
         wanted.append(P)
     deviation = np.sqrt(np.diagonal(wanted, axis1=1, axis2=2)[:, :3])
     assert_allclose(cramer_rao_bound(SHORT, thrust=thrust), deviation, rtol=1e-7)
+
+
+def test_information_limit_of_one_unknown_strength():
+    """843.2 m at 18 000 s, by central differences of whole flights in the chapter on limits."""
+    known = cramer_rao_bound("A", process_noise=False)
+    strength = cramer_rao_bound("A", thrust="strength", process_noise=False)
+    assert_allclose(strength[:7293], known[:7293], rtol=1e-9)
+    assert_allclose(np.linalg.norm(strength[18000]), 843.2, rtol=1e-3)
+    told = cramer_rao_bound("A", thrust="strength", process_noise=False, acceleration=1e-9)
+    assert_allclose(told, known, rtol=1e-6)

@@ -23,7 +23,8 @@ from .ledger import (
     load,
     load_words,
 )
-from .pages import Badge, Page, rules, scorecard, summary
+from .pages import Badge, Page, rules, summary
+from .scorecard import bars, database, scorecard
 from .statements import Statement, load_statements, statements
 from .verdicts import Parts, Readings, Some, derive
 
@@ -44,7 +45,9 @@ __all__ = [
     "Some",
     "Statement",
     "Word",
+    "bars",
     "check",
+    "database",
     "derive",
     "find",
     "load",

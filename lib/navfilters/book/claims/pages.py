@@ -1,4 +1,4 @@
-"""What a reader sees of the ledger: badges, the summary, the scorecard, the rules."""
+"""What a reader sees of the ledger: badges, the summary, the rules."""
 
 import html
 from collections import Counter
@@ -13,8 +13,6 @@ from .ledger import (
     SHAPE_OF_A_NUMBER,
     VERDICTS,
     Claim,
-    ClaimError,
-    find,
     load,
     load_words,
 )
@@ -35,18 +33,18 @@ class Badge:
 
     def __repr__(self) -> str:
         c = self.claim
-        return f"[{c.verdict}] {c.id}: {_side(c)} {plain(c.paper_value)}, ours {plain(c.ours)}"
+        return f"[{c.verdict}] {c.id}: {side_of(c)} {plain(c.paper_value)}, ours {plain(c.ours)}"
 
     def _repr_html_(self) -> str:
-        c = self.claim
-        numbers = f"ours {_rich(c.ours)}"
+        c, up = self.claim, "../" * self.claim.chapter.count("/")
+        numbers = f"ours {rich(c.ours)}"
         if c.paper_value is not None:
-            numbers = f"{_side(c)} {_rich(c.paper_value)} · {numbers}"
+            numbers = f"{side_of(c)} {rich(c.paper_value)} · {numbers}"
         return (
-            f'<div class="claim claim-{_slug(c.verdict)}" id="claim-{c.id}">'
-            f'<span class="claim-verdict">{c.verdict}</span> {_text(c.statement)} '
-            f'<span class="claim-source">{_text(c.source)}</span>'
-            f'<div class="claim-numbers">{numbers}</div>{_because(c)}</div>'
+            f'<div class="claim claim-{slug(c.verdict)}" id="claim-{c.id}">'
+            f'<span class="claim-verdict">{c.verdict}</span> {text(c.statement)} '
+            f'<a class="claim-source" href="{up}scorecard.html#row-{c.id}">{text(c.source)}</a>'
+            f'<div class="claim-numbers">{numbers}</div>{because(c)}</div>'
         )
 
 
@@ -79,63 +77,26 @@ def summary() -> Page:
     """
     ledger = [c for c in load().values() if not c.own]
     findings = len(load()) - len(ledger)
-    counts = Counter((_work(c), c.threshold, c.verdict) for c in ledger)
+    counts = Counter((work_of(c), c.threshold, c.verdict) for c in ledger)
     rows, lines = [], []
-    for source in dict.fromkeys(_work(c) for c in ledger):
+    for source in dict.fromkeys(work_of(c) for c in ledger):
         for threshold in _thresholds(ledger, source):
             found = {verdict: counts[source, threshold, verdict] for verdict in OF_A_SOURCE}
             found["all"] = sum(found.values())
             cells = "".join(
-                f'<td class="claim-{_slug(verdict)}">{n or "·"}</td>'
-                for verdict, n in found.items()
+                f'<td class="claim-{slug(verdict)}">{n or "·"}</td>' for verdict, n in found.items()
             )
-            rows.append(f"<tr><th>{_text(source)}</th><td>{threshold}</td>{cells}</tr>")
+            rows.append(f"<tr><th>{text(source)}</th><td>{threshold}</td>{cells}</tr>")
             lines.append(f"{source} {threshold}: {found}")
     titles = "".join(
-        f'<th class="claim-{_slug(v)}"><span class="claim-verdict">{v}</span></th>'
+        f'<th class="claim-{slug(v)}"><span class="claim-verdict">{v}</span></th>'
         for v in OF_A_SOURCE
     )
     head = f"<tr><th>source</th><th>limit</th>{titles}<th>all</th></tr>"
     counted = f'<table class="claims-summary">{head}{"".join(rows)}</table>'
     own = f"{ESTABLISHED}, as findings of this book's own: {findings}"
-    note = f'<div class="claim-{_slug(ESTABLISHED)}"><span class="claim-verdict">{own}</span></div>'
+    note = f'<div class="claim-{slug(ESTABLISHED)}"><span class="claim-verdict">{own}</span></div>'
     return Page(_scrolling(counted) + note, "\n".join([*lines, own]))
-
-
-def scorecard(work: str) -> Page:
-    """Every claim of one source: the paper's value, ours, the verdict, and where it is checked.
-
-    Parameters
-    ----------
-    work : str
-        The first word of the claims' source, such as "perea2007".
-
-    Returns
-    -------
-    Page
-        Links are relative to book/.
-
-    Raises
-    ------
-    ClaimError
-        When the ledger holds nothing of that source.
-    """
-    chosen = [c for c in load().values() if _work(c) == work]
-    if not chosen:
-        raise ClaimError(f"no claim of {work!r} in {find()}")
-    rows = []
-    for c in chosen:
-        where = f'<a href="{c.chapter}.html#claim-{c.id}">{_text(_place(c))}</a>'
-        paper = "" if c.paper_value is None else _rich(c.paper_value)
-        if c.threshold == OURS:
-            paper = f'<span class="claim-reason">read as</span> {paper}'
-        rows.append(
-            f"<tr><td>{_text(c.statement)} {where}{_because(c)}</td><td>{paper}</td>"
-            f'<td>{_rich(c.ours)}</td><td class="claim-{_slug(c.verdict)}">'
-            f'<span class="claim-verdict">{c.verdict}</span></td></tr>'
-        )
-    page = table("claims-table", ("claim", "paper", "ours", "verdict"), rows)
-    return Page(page, "\n".join(repr(Badge(c)) for c in chosen))
 
 
 def rules() -> Page:
@@ -147,11 +108,11 @@ def rules() -> Page:
     """
     ledger = load().values()
     groups = [
-        (f"{name}: {word.meaning}", _rule(word.rule), [c for c in ledger if c.word == name])
+        (f"{name}: {word.meaning}", rule_of(word.rule), [c for c in ledger if c.word == name])
         for name, word in load_words().items()
     ]
     printed = [c for c in ledger if c.kind == "value" and c.threshold == PRINTED]
-    in_shape = f"in shape: {_rule(SHAPE_OF_A_NUMBER)}"
+    in_shape = f"in shape: {rule_of(SHAPE_OF_A_NUMBER)}"
     groups.append(("printed numbers: within their digits", in_shape, printed))
     wordless = [c for c in ledger if c.threshold == OURS and not c.word]
     groups.append(("readings of another kind", "each its own", wordless))
@@ -159,11 +120,11 @@ def rules() -> Page:
     for name, rule, using in groups:
         others = [c for c in using if c.own_rule]
         departures = "".join(
-            f'<div class="claim-reason">{_text(_at(c))}: {_text(c.own_rule)}</div>' for c in others
+            f'<div class="claim-reason">{text(_at(c))}: {text(c.own_rule)}</div>' for c in others
         )
         same = len(using) - len(others)
         rows.append(
-            f"<tr><td>{_text(name)}{departures}</td><td>{rule}</td><td>{same}</td>"
+            f"<tr><td>{text(name)}{departures}</td><td>{rule}</td><td>{same}</td>"
             f"<td>{len(others)}</td></tr>"
         )
         lines.append(f"{name.partition(':')[0]}: {same} and {len(others)} others")
@@ -177,15 +138,15 @@ def _at(claim: Claim) -> str:
 
 
 def _thresholds(ledger: Sequence[Claim], source: str) -> list[str]:
-    found = {c.threshold for c in ledger if _work(c) == source}
+    found = {c.threshold for c in ledger if work_of(c) == source}
     return [t for t in (PRINTED, OURS) if t in found]
 
 
-def _side(claim: Claim) -> str:
+def side_of(claim: Claim) -> str:
     return "read as" if claim.threshold == OURS else "paper"
 
 
-def _because(claim: Claim) -> str:
+def because(claim: Claim) -> str:
     """What stands under a claim: reason, what is open, the route, rules that it had before."""
     notes = [claim.reason]
     if claim.left_open:
@@ -193,7 +154,7 @@ def _because(claim: Claim) -> str:
     if claim.route:
         notes.append(f"Twice: {claim.route}")
     notes += [f"The rule was {old['was']}; changed: {old['why']}" for old in claim.revised]
-    return "".join(f'<div class="claim-reason">{_text(note)}</div>' for note in notes if note)
+    return "".join(f'<div class="claim-reason">{text(note)}</div>' for note in notes if note)
 
 
 def _scrolling(table: str) -> str:
@@ -206,7 +167,7 @@ def table(style: str, head: Sequence[str], rows: Sequence[str]) -> str:
     return _scrolling(f'<table class="{style}"><tr>{top}</tr>{"".join(rows)}</table>')
 
 
-def _work(claim: Claim) -> str:
+def work_of(claim: Claim) -> str:
     return claim.source.split(",")[0]
 
 
@@ -214,18 +175,18 @@ def _place(claim: Claim) -> str:
     return claim.source.partition(", ")[2] or claim.chapter.rpartition("/")[2]
 
 
-def _slug(verdict: str) -> str:
+def slug(verdict: str) -> str:
     return verdict.replace(" ", "-")
 
 
-def _text(text: str) -> str:
-    return html.escape(text, quote=False)
+def text(words: str) -> str:
+    return html.escape(words, quote=False)
 
 
-def _rule(rule: Mapping) -> str:
+def rule_of(rule: Mapping) -> str:
     if "factor" in rule:
         return f"within a factor {rule['factor']:g}"
-    return _rich(rule)
+    return rich(rule)
 
 
 def plain(value: Any) -> str:
@@ -245,15 +206,15 @@ def plain(value: Any) -> str:
     return str(value)
 
 
-def _rich(value: Any) -> str:
+def rich(value: Any) -> str:
     names = {"at_most": "≤ ", "at_least": "≥ "}
     if isinstance(value, Mapping):
-        return "; ".join(f"{names.get(k) or _text(k) + ': '}{_rich(v)}" for k, v in value.items())
+        return "; ".join(f"{names.get(k) or text(k) + ': '}{rich(v)}" for k, v in value.items())
     if isinstance(value, int | float) and not isinstance(value, bool) and value:
         digits = f"{value:.5g}"
         if "e" in digits:
             mantissa, exponent = digits.split("e")
             return f"{mantissa}&thinsp;×&thinsp;10<sup>{int(exponent)}</sup>"
     if isinstance(value, list | tuple):
-        return ", ".join(_rich(item) for item in value)
-    return _text(plain(value))
+        return ", ".join(rich(item) for item in value)
+    return text(plain(value))

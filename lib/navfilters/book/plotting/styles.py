@@ -14,6 +14,8 @@ EKF, SECOND_ORDER, UKF, MEASUREMENT = "#D55E00", "#009E73", "#0072B2", "#E69F00"
 
 ROBUST, CORRECTED, LATER = "#CC79A7", "#882255", "#56B4E9"
 
+TOLD, MIXED, FADING = "#332288", "#7F5A2A", "#AA4499"
+
 TRUTH, BOUND = "black", "0.55"
 
 _DASHES: dict[str, Any] = {
@@ -55,6 +57,14 @@ _VARIANTS = {
     "converted": (LATER, "dotted", "^"),
     "converted at mean": (LATER, "dash-dot-dot", "P"),
     "polar": (LATER, "long dash", "v"),
+    "AREKF, tuned": (ROBUST, "long dash", "X"),
+    "strong tracking": (ROBUST, "dotted", "^"),
+    "strong tracking, softened": (FADING, "dashed", "D"),
+    "constant Q": (MIXED, "plain", "s"),
+    "thrust as state": (MIXED, "dashed", "D"),
+    "timed Q": (TOLD, "plain", "s"),
+    "timed thrust vector": (TOLD, "dashed", "D"),
+    "timed strength": (TOLD, "dash-dot", "*"),
 }
 
 STYLES: dict[str, dict[str, Any]] = {
@@ -62,6 +72,18 @@ STYLES: dict[str, dict[str, Any]] = {
     for name, (color, dash, marker) in _VARIANTS.items()
 }
 """Matplotlib keywords of each filter."""
+
+STATIONS: dict[str, dict[str, Any]] = {
+    name: {"color": color, "marker": marker, "markersize": 3.5, "linestyle": "none"}
+    for name, color, marker in (
+        ("Uralla", "#0072B2", "o"),
+        ("Kumsan", "#D55E00", "^"),
+        ("Pretoria", "#009E73", "s"),
+        ("Fucino", "#CC79A7", "x"),
+        ("CastleRock", "black", "+"),
+    )
+}
+"""Matplotlib keywords of each ground station."""
 
 
 def use_style() -> None:

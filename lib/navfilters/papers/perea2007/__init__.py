@@ -8,11 +8,13 @@ from navfilters.papers.perea2007.experiment import (
     isotropic,
     position_error,
 )
+from navfilters.papers.perea2007.recycling import false_information
 
 __all__ = [
     "FILTERS",
     "Setup",
     "deviations",
+    "false_information",
     "improvement",
     "isotropic",
     "position_error",

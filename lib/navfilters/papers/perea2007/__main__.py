@@ -1,4 +1,4 @@
-"""Compute and draw every map: ``python -m navfilters.papers.perea2007 --size 256``."""
+"""Divergence maps, or ten filters with noise: ``python -m navfilters.papers.perea2007``."""
 
 import argparse
 import sys
@@ -17,23 +17,32 @@ from navfilters.papers.perea2007.divergence_maps import (
     starts,
 )
 from navfilters.papers.perea2007.experiment import FILTERS, Setup
+from navfilters.papers.perea2007.noise_table import simulate, table
+from navfilters.papers.perea2007.noisy_fix import UPDATES
+from navfilters.runs.progress import bar
 from navfilters.types import Array
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Compute and draw every map.
+    """Compute and draw every map, or print how the filters do with noise.
 
     Parameters
     ----------
     arguments : sequence of str, optional
         Those of the command line by default.
     """
-    parser = argparse.ArgumentParser(description="Divergence maps of the ten filters.")
+    parser = argparse.ArgumentParser(description="Ten filters: divergence maps, or noise.")
     parser.add_argument("--size", type=int, default=256, help="points in each direction")
     parser.add_argument("--engine", choices=("numpy", "jax"), default="numpy")
     parser.add_argument("--steps", type=int, default=Setup.steps, help="number of updates")
     parser.add_argument("--out", default="divergence-maps", help="beginning of the files' names")
+    parser.add_argument("--noise", type=int, metavar="RUNS", help="so many noisy runs, no maps")
     chosen = parser.parse_args(arguments)
+    if chosen.noise is not None:
+        if chosen.noise < 1:
+            parser.error(f"--noise must be at least 1; found {chosen.noise}")
+        _noise(chosen.noise)
+        return
     if chosen.size < 2 or chosen.steps < 1:
         parser.error(
             f"--size must be at least 2 and --steps at least 1; found {chosen.size}, {chosen.steps}"
@@ -51,6 +60,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     np.savez_compressed(f"{chosen.out}.npz", **{k.replace("/", " "): v for k, v in found.items()})
     for path in _draw(found, chosen.size, chosen.out):
         sys.stdout.write(f"{path}\n")
+
+
+def _noise(runs: int) -> None:
+    setup = Setup()
+    with bar(runs * len(FILTERS)) as done:
+        scores = simulate(runs, setup, done=done)
+    for n in UPDATES:
+        sys.stdout.write(f"{table(scores, setup, n)}\n\n")
 
 
 def _draw(found: dict[str, Array], size: int, out: str) -> list[str]:

@@ -48,13 +48,32 @@ EDGE = 9.210340371976182
 """The NEES that one in a hundred of a chi-square variable with two degrees of freedom exceeds."""
 
 
+class Experiment(NamedTuple):
+    """What all filters are given.
+
+    Parameters
+    ----------
+    start : array (runs, 2)
+        First estimates, units.
+    z : array (steps, runs, 2)
+        Ranges, units, and bearings, rad.
+    """
+
+    start: Array
+    z: Array
+
+    def few(self, runs: int) -> "Experiment":
+        """The first runs."""
+        return Experiment(self.start[:runs], self.z[:, :runs])
+
+
 class Runs(NamedTuple):
     """What a filter made of many runs, after some of its updates.
 
     Parameters
     ----------
     error : array (len(after), runs)
-        Distance of the estimate from the truth, units.
+        Distance of the estimate from the truth, units; infinite where there is none.
     nees : array (len(after), runs)
     """
 
@@ -67,27 +86,29 @@ class Runs(NamedTuple):
         return np.mean(~(self.nees <= EDGE), axis=-1)
 
 
-def measurements(setup: Setup, runs: int, steps: int, seed: int = 0) -> Array:
-    """The set-up's range and bearing with its noise, (steps, runs, 2)."""
-    noise = np.random.default_rng(seed).standard_normal((steps, runs, 2))
-    return setup.z + noise * np.sqrt(np.diagonal(setup.model.R))
+def experiment(setup: Setup, runs: int, steps: int, seed: int = 0) -> Experiment:
+    """Starts drawn as the filters believe them to be, and measurements with the noise of R."""
+    rng = np.random.default_rng(seed)
+    noise = rng.standard_normal((steps, runs, 2)) * np.sqrt(np.diagonal(setup.model.R))
+    start = setup.x_true + setup.sigma * rng.standard_normal((runs, 2))
+    return Experiment(start, setup.z + noise)
 
 
 def follow(
     estimator: Any,
     setup: Setup,
-    z: Array,
+    given: Experiment,
     after: Sequence[int] = (1, 10, 100),
     *,
     progress: bool = False,
 ) -> Runs:
-    """A filter from the set-up's start through many runs; bearings are wrapped.
+    """A filter through many runs; bearings are wrapped.
 
     Parameters
     ----------
     estimator : Filter
     setup : Setup
-    z : array (steps, runs, 2)
+    given : Experiment
     after : sequence of int
         The numbers of updates to look after.
     progress : bool
@@ -97,11 +118,10 @@ def follow(
     -------
     Runs
     """
-    count = z.shape[1]
-    prior = isotropic(np.broadcast_to(setup.x0, (count, 2)), np.full(count, setup.sigma))
+    start, z = given
     history = sweep(
         estimator,
-        prior,
+        isotropic(start, np.full(len(start), setup.sigma)),
         z[: max(after)],
         RangeBearing(setup.model.R),
         z_per_step=True,
@@ -109,8 +129,14 @@ def follow(
         workers=None if progress else 1,
         progress=progress,
     ).record
-    error = np.array(setup.x_true) - history.mean[list(after)]
-    return Runs(np.linalg.norm(error, axis=-1), nees(error, history.cov[list(after)]))
+    return judged(setup, history.mean[list(after)], history.cov[list(after)])
+
+
+def judged(setup: Setup, mean: Array, cov: Array) -> Runs:
+    """Estimates (..., runs, 2) beside the truth."""
+    error = np.array(setup.x_true) - mean
+    distance = np.linalg.norm(error, axis=-1)
+    return Runs(np.where(np.isfinite(distance), distance, np.inf), nees(error, cov))
 
 
 def combinations() -> dict[tuple[str, str, str], Filter]:
@@ -141,9 +167,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             f"--runs and --updates must be at least 1; found {chosen.runs}, {chosen.updates}"
         )
     setup = Setup()
-    z = measurements(setup, chosen.runs, chosen.updates)
+    given = experiment(setup, chosen.runs, chosen.updates)
     for names, estimator in combinations().items():
-        found = follow(estimator, setup, z, (chosen.updates,), progress=True)
+        found = follow(estimator, setup, given, (chosen.updates,), progress=True)
         what, middle = ", ".join(names), np.median(found.error)
         sys.stdout.write(f"{what:40} outside {found.outside[0]:6.1%}, median {middle:.2g} units\n")
 

@@ -1,6 +1,7 @@
 """Pogorelsky et al. (2020): navigation by SAR images of known terrain."""
 
 from navfilters.papers.pogorelsky2020.acquisition import acquire, measure_directly
+from navfilters.papers.pogorelsky2020.antenna_tables import antenna_table
 from navfilters.papers.pogorelsky2020.campaign import (
     ACQUIRING,
     CLIMBING,
@@ -18,6 +19,7 @@ from navfilters.papers.pogorelsky2020.closed_loop import (
     monte_carlo_closed,
     summary,
 )
+from navfilters.papers.pogorelsky2020.different_images import DifferentImages
 from navfilters.papers.pogorelsky2020.experiment import (
     CASES,
     NOMINAL,
@@ -26,6 +28,15 @@ from navfilters.papers.pogorelsky2020.experiment import (
     of_case,
 )
 from navfilters.papers.pogorelsky2020.final_nees import final_nees, nees_line
+from navfilters.papers.pogorelsky2020.image_blocks import (
+    BlockCurves,
+    BlockMatches,
+    BlockPlace,
+    block_curves,
+    block_tables,
+    cut_blocks,
+    match_blocks,
+)
 from navfilters.papers.pogorelsky2020.image_tables import (
     ImageTable,
     assumed_speeds,
@@ -69,10 +80,23 @@ from navfilters.papers.pogorelsky2020.real_loop import (
     true_flight,
 )
 from navfilters.papers.pogorelsky2020.real_patches import MARGIN, Patch, cut_patches
+from navfilters.papers.pogorelsky2020.timed_images import (
+    TimedImages,
+    sweep_speed,
+    white_errors,
+    with_pointing_noise,
+)
 from navfilters.papers.pogorelsky2020.true_flight import Truth, initial_state, truth
+from navfilters.papers.pogorelsky2020.without_antenna import (
+    ARCSECOND,
+    Trial,
+    fly,
+    fly_with_offsets,
+)
 
 __all__ = [
     "ACQUIRING",
+    "ARCSECOND",
     "CASES",
     "CLIMBING",
     "FULL",
@@ -86,7 +110,11 @@ __all__ = [
     "Agreement",
     "Altered",
     "Attempt",
+    "BlockCurves",
+    "BlockMatches",
+    "BlockPlace",
     "Campaign",
+    "DifferentImages",
     "Folder",
     "Formed",
     "ImageTable",
@@ -102,20 +130,29 @@ __all__ = [
     "Seen",
     "Setup",
     "SimulatedImages",
+    "TimedImages",
+    "Trial",
     "Truth",
     "acquire",
+    "antenna_table",
     "assumed_speeds",
+    "block_curves",
+    "block_tables",
     "campaign_report",
     "closed_table",
+    "cut_blocks",
     "cut_patches",
     "final_nees",
     "first_lines",
     "fitted",
     "flight_through",
+    "fly",
+    "fly_with_offsets",
     "image_table",
     "initial_state",
     "linearised_flight",
     "lines_between",
+    "match_blocks",
     "measure_directly",
     "misalignment",
     "monte_carlo",
@@ -131,7 +168,10 @@ __all__ = [
     "same_images",
     "simulate_images",
     "summary",
+    "sweep_speed",
     "tabulate",
     "true_flight",
     "truth",
+    "white_errors",
+    "with_pointing_noise",
 ]

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Sequence
 
 from navfilters.numerics.extras import command
+from navfilters.papers.pogorelsky2020.antenna_tables import antenna_table
 from navfilters.papers.pogorelsky2020.campaign import campaign_report, run_campaign
 from navfilters.papers.pogorelsky2020.closed_loop import closed_table
 from navfilters.papers.pogorelsky2020.experiment import CASES
@@ -87,6 +88,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--closed-loop", action="store_true", help="form and match images instead of drawing errors"
     )
+    parser.add_argument(
+        "--without-antenna",
+        action="store_true",
+        help="open-loop, with the plane of zero Doppler, with other errors, and with cures",
+    )
     _add_campaign(parser)
     _add_product(parser)
     chosen = parser.parse_args(arguments)
@@ -116,6 +122,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.stdout.write(_campaign(parser, chosen))
         return
     table, seconds = (closed_table, 25) if chosen.closed_loop else (open_table, 600)
+    if chosen.without_antenna:
+        if chosen.closed_loop:
+            parser.error("--without-antenna is open-loop; found --closed-loop too")
+        table = antenna_table
     text = table(chosen.case, chosen.runs, chosen.seed, progress=progress_bar)
     about = f"{chosen.case}, {chosen.runs} runs, 1-sigma position at {seconds} s"
     sys.stdout.write(f"{about}\n{text}\n")

@@ -49,8 +49,8 @@ def acquire(setup: Setup, k: int, imaging: Imaging = FULL) -> Acquisition:
     flight = Flight.through(orbit.derivative, x, max(span, 1.0))
     place = ecef_to_geodetic(ellipsoid_intersection(x[:3], beam))
     terrain = sample_terrain(
-        float(place[0]),
-        float(place[1]),
+        float(place[0]) + imaging.moved[0],
+        float(place[1]) + imaging.moved[1],
         quarter_turns=(k - 1) // 2 % 4,
         mirrored=(k - 1) % 2 == 1,
     )

@@ -48,6 +48,8 @@ class Imaging:
     matcher : Matcher
     seed : int
         Of land cover, speckle and noise.
+    moved : tuple of float
+        By which the tile of terrain is moved to the north and the east, deg: other hills.
 
     References
     ----------
@@ -70,6 +72,7 @@ class Imaging:
     relief: bool = True
     matcher: Matcher = MATCHER
     seed: int = 0
+    moved: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         validation.whole_number("seed", self.seed, 0)

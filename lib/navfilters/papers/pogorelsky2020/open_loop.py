@@ -58,9 +58,7 @@ class SimulatedImages:
         Measurement
             r_f (runs, 3), slant_range (runs,), speed (runs,).
         """
-        setup, x = self.setup, self.flight.x[k]
-        model = replace(setup.geometry, T_e_b=self.flight.T_e_b[k])
-        r_f = ellipsoid_intersection(x[:3], model.boresight(self.q_mu[:, k]))
+        setup, x, r_f = self.setup, self.flight.x[k], self.centre(k)
         slant_range = np.linalg.norm(r_f - x[:3], axis=-1)
         local = np.asarray(setup.pixel) * self.noise.pixel[:, k - 1]
         # one product per row, not one of matrices: a run's digits must not depend on the batch
@@ -70,6 +68,21 @@ class SimulatedImages:
             slant_range + setup.sigma_range * self.noise.slant_range[:, k - 1],
             np.linalg.norm(x[3:]) + setup.sigma_speed * self.noise.speed[:, k - 1],
         )
+
+    def centre(self, k: int) -> Array:
+        """Where the beam meets the ground at the end of interval k, (runs, 3), m.
+
+        Parameters
+        ----------
+        k : int
+            From 0.
+
+        Returns
+        -------
+        array (runs, 3)
+        """
+        model = replace(self.setup.geometry, T_e_b=self.flight.T_e_b[k])
+        return ellipsoid_intersection(self.flight.x[k, :3], model.boresight(self.q_mu[:, k]))
 
     def true_state(self, k: int) -> NavigationState:
         """The state at the start, or that the image after interval k is made at.
@@ -158,6 +171,7 @@ def monte_carlo(
     flight: Truth | None = None,
     measure: Callable[[int, NavigationState], Measurement] | None = None,
     estimator: Any = None,
+    sensor: Any = None,
     progress: Callable[[Iterable], Iterable] = iter,
 ) -> MonteCarlo:
     """All runs of a test case in one batch.
@@ -183,6 +197,8 @@ def monte_carlo(
         NaN in it is an image that was not matched.
     estimator : Filter, optional
         With ``init``, ``predict`` and ``update``; the set-up's ``mekf`` by default.
+    sensor : MeasurementModel, optional
+        What the filter is told of ``measure``; the set-up's geometry by default.
     progress : callable
         Wraps the iterable of intervals.
 
@@ -210,19 +226,21 @@ def monte_carlo(
     images = simulate_images(setup, runs, seed, flight=flight)
     measure = images if measure is None else measure
     ticks = iter(progress(range(1, intervals + 1)))
-    nothing = np.full((len(images.noise.first), 5), np.nan)
+    last = np.empty(0)
 
     def image(k: int, state: FilterState) -> Array:
+        nonlocal last
         next(ticks)
         if k >= updates:
-            return nothing  # the filter coasts
-        return measure(k + 1, NavigationState.of(state.estimate.mean)).z
+            return np.full_like(last, np.nan)  # the filter coasts
+        last = measure(k + 1, NavigationState.of(state.estimate.mean)).z
+        return last
 
     estimates, innovations, S = run(
         setup.mekf if estimator is None else estimator,
-        _first_estimate(setup, images.true_state(0), images.noise.first),
+        first_estimate(setup, images.true_state(0), images.noise.first),
         image,
-        SarPass(setup.geometry, flight.T_e_b[1:]),
+        SarPass(setup.geometry, flight.T_e_b[1:]) if sensor is None else sensor,
         intervals,
         dynamics=setup.dynamics,
         record=lambda state: (state.estimate, state.innovation, state.S),
@@ -240,7 +258,7 @@ def monte_carlo(
     )
 
 
-def _first_estimate(setup: Setup, true: NavigationState, drawn: Array) -> Gaussian:
+def first_estimate(setup: Setup, true: NavigationState, drawn: Array) -> Gaussian:
     """The truth without a drawn error, so that truth minus estimate is that error exactly."""
     error = np.sqrt(np.diag(setup.P0)) * drawn
     return Gaussian(retract(true.x, -error), np.broadcast_to(setup.P0, (len(drawn), 9, 9)))

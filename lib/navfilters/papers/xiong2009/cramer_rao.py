@@ -15,7 +15,7 @@ from navfilters.types import Array
 def cramer_rao_bound(
     variant: str | Setup = "A",
     *,
-    thrust: Literal["known", "unknown"] = "known",
+    thrust: Literal["known", "unknown", "strength"] = "known",
     process_noise: bool = True,
     acceleration: float | None = None,
 ) -> Array:
@@ -28,9 +28,10 @@ def cramer_rao_bound(
     ----------
     variant : str or Setup
         A key of ``VARIANTS``, or a set-up of one noise.
-    thrust : {"known", "unknown"}
+    thrust : {"known", "unknown", "strength"}
         Unknown: in each sampling interval with fire its acceleration is another unknown constant
-        vector, appended to the state.
+        vector, appended to the state. Strength: it is along the velocity, and only its strength is
+        unknown, the same in all burns.
     process_noise : bool
         Without, the limit of the experiment, whose truth has none; with the filters' Q, the limit
         for an orbit that is disturbed as the filters believe.
@@ -49,18 +50,24 @@ def cramer_rao_bound(
         An unknown variant or thrust, or an acceleration out of range.
     """
     setup = _variant(variant)
-    if thrust not in ("known", "unknown"):
-        raise ValueError(f"thrust must be one of ['known', 'unknown']; found {thrust!r}")
+    if thrust not in ("known", "unknown", "strength"):
+        raise ValueError(
+            f"thrust must be one of ['known', 'strength', 'unknown']; found {thrust!r}"
+        )
     flight, sensor = truth(setup), setup.sensor
     a = flight.thrust.magnitude if acceleration is None else acceleration
     if not 0 <= a <= 1000:  # beyond, doubles do not carry P
         raise ValueError(f"acceleration must be 0 to 1000 m/s^2; found {acceleration}")
-    orbit = replace(setup, step=1.0).orbit(flight.thrust if thrust == "known" else COASTING)
+    orbit = replace(setup, step=1.0).orbit(COASTING if thrust == "unknown" else flight.thrust)
     burning = [flight.thrust.strength(t + 0.5) > 0 for t in range(setup.duration)]
     F = np.zeros((setup.duration, 9, 9)) + np.eye(9)
     F[:, :6, :6] = orbit.transitions(flight.states)
     unknown = np.array(burning) & (thrust == "unknown")
     F[:, :6, 6:] = unknown[:, None, None] * np.concatenate([np.eye(3) / 2, np.eye(3)])
+    if thrust == "strength":
+        v = flight.states[:-1, 3:] + flight.states[1:, 3:]
+        u = v / np.linalg.norm(v, axis=1, keepdims=True)
+        F[:, :6, 6] = np.array(burning)[:, None] * np.concatenate([u / 2, u], axis=1)
     Q = np.pad(orbit.Q if process_noise else np.zeros((6, 6)), (0, 3))
     Phi, W = _since_start(F.reshape(-1, setup.interval, 9, 9), Q)
     H = np.pad(
@@ -68,10 +75,12 @@ def cramer_rao_bound(
     )
     P = np.zeros((9, 9))
     P[:6, :6] = setup.prior.cov
+    P[6, 6] = a**2
     path = [P[None]]
     for k in range(len(H)):
-        P[6:], P[:, 6:] = 0, 0  # another acceleration, and nothing known of it
-        P[6:, 6:] = a**2 * np.eye(3)
+        if thrust == "unknown":
+            P[6:], P[:, 6:] = 0, 0  # another acceleration, and nothing known of it
+            P[6:, 6:] = a**2 * np.eye(3)
         path.append(Phi[k] @ P @ Phi[k].mT + W[k])
         P_xz = path[-1][-1] @ H[k].T
         K = right_divide(P_xz, H[k] @ P_xz + sensor.R)

@@ -137,6 +137,7 @@ def autofocus(
     steps: Sequence[float] = (4.0, 1.0),
     limits: tuple[float, float] = (-np.inf, np.inf),
     slope: float = 0.0,
+    criterion: Callable[[Array], float] = sharpness,
 ) -> Climb:
     """Climb to the in-track velocity that focuses raw data.
 
@@ -154,6 +155,8 @@ def autofocus(
         Of the in-track velocity, m/s.
     slope : float
         See ``Focuser.image``.
+    criterion : callable
+        Intensity (lines, samples) -> what is made large: by default the paper's.
 
     Returns
     -------
@@ -166,6 +169,6 @@ def autofocus(
 
     def of(speed: float) -> float:
         pixels = focuser.image(effective(speed), slope).pixels
-        return sharpness(pixels.real**2 + pixels.imag**2)
+        return criterion(pixels.real**2 + pixels.imag**2)
 
     return hill_climb(of, start, steps, limits)

@@ -115,6 +115,11 @@ class Focuser:
         """dr = c / (2 f_s), m. Eq. (2)."""
         return c / (2 * self._sampling)
 
+    @property
+    def wavelength(self) -> float:
+        """Of the carrier, m."""
+        return self._wavelength
+
     def image(self, velocity: float, slope: float = 0.0) -> Image:
         """Focus for an effective velocity.
 
