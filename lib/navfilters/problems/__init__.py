@@ -7,7 +7,7 @@ from navfilters.problems.later_cures import CURES
 from navfilters.problems.noisier import Noisier
 from navfilters.problems.outcome import Outcome, treat
 from navfilters.problems.problem import LOST, Draw, Problem
-from navfilters.problems.reading import Row, best, elsewhere, own, reasons, rows
+from navfilters.problems.reading import Row, best, elsewhere, listing, own, reasons, rows
 from navfilters.problems.static_fix import static_fix
 from navfilters.problems.stored import RUNS, read
 from navfilters.problems.table import Cell, cells, table
@@ -30,6 +30,7 @@ __all__ = [
     "elsewhere",
     "evaluations",
     "in_units",
+    "listing",
     "own",
     "problems",
     "read",

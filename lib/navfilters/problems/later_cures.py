@@ -23,7 +23,7 @@ from navfilters.models import (
     to_cartesian,
     to_polar,
 )
-from navfilters.problems.cures import NOISES, PAPERS, Cure, Treatment, UnfitError, plain
+from navfilters.problems.cures import PAPERS, Cure, Treatment, UnfitError, plain
 from navfilters.problems.noisier import Noisier
 from navfilters.problems.problem import Draw, Problem
 from navfilters.types import Array, Gaussian
@@ -89,7 +89,7 @@ LATER = (
     Cure("STF", _fading, 1.0, (1.0, 2.0, 5.0, 10.0, 100.0), "softening factor beta"),
     Cure("gate", plain(Filter(rule=GatedInflation()))),
     Cure("VB", _learning, 0.98, (0.9, 0.98, 1.0), "rho"),
-    Cure("IMM", _interacting, 1e8, NOISES, "factor of Q in the second mode"),
+    Cure("IMM", _interacting, 1e8, (1e2, 1e4, 1e6, 1e8), "factor of Q in the second mode"),
     Cure("converted", _converted),
     Cure("polar", _polar),
 )

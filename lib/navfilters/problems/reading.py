@@ -132,3 +132,47 @@ def reasons(found: Iterable[Cell]) -> dict[str, dict[str, list[str]]]:
         if cell.reason:
             why.setdefault(cell.cure, {}).setdefault(cell.reason, []).append(cell.problem)
     return why
+
+
+def listing(found: Sequence[Row]) -> str:
+    """The table as text, a paragraph for each row, for links and for readers of text.
+
+    Parameters
+    ----------
+    found : sequence of Row
+
+    Returns
+    -------
+    str
+        HTML; the paragraph of "B-EKF 1 *" has the id "cure-b-ekf-1-best".
+    """
+    words = {-1: "cautious", 0: "honest", 1: "over-confident"}
+    paragraphs = []
+    for row in found:
+        pairs = [
+            f"{cell.problem}: {'cannot act' if cell.reason else _pair(cell, words[cell.honest])}"
+            for cell in row.cells
+        ]
+        paragraphs.append(
+            f'<p id="{anchor(row.label)}"><b>{row.label}</b> &#8212; {"; ".join(pairs)}.</p>'
+        )
+    return "\n".join(paragraphs)
+
+
+def anchor(label: str) -> str:
+    """The id of a row's paragraph.
+
+    Parameters
+    ----------
+    label : str
+
+    Returns
+    -------
+    str
+    """
+    return "cure-" + label.replace(HINDSIGHT, " best").lower().replace(" ", "-")
+
+
+def _pair(cell: Cell, word: str) -> str:
+    value = "" if cell.value is None else f" with {cell.value:g}"
+    return f"{cell.ratio:.2g} times the reference{value}, {word} ({cell.honesty:.2g})"

@@ -108,7 +108,7 @@ def table(
     patients: Mapping[str, Problem] | None = None,
     cures: Iterable[Cure] = CURES,
     workers: int | None = 1,
-    progress: Callable[..., Iterable] = iter,
+    progress: Callable[..., Iterable] = lambda parts, total=None: parts,
 ) -> list[Cell]:
     """Every cure on every problem.
 
@@ -121,7 +121,7 @@ def table(
     workers : int, optional
         Processes; more than one need joblib. By default one, with None one per core.
     progress : callable
-        Wraps the iterable of parts, a problem with some cures each.
+        (parts, total=) -> parts: wraps the iterable of parts, a problem with some cures each.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def table(
         for i in range(0, len(cures), size)
     ]
     if workers == 1:
-        return [cell for part in progress(parts) for cell in _part(*part)]
+        return [cell for part in progress(parts, total=len(parts)) for cell in _part(*part)]
     joblib = needed("joblib", "navfilters[sweep]", "a table with workers")
     pool = joblib.Parallel(workers or joblib.cpu_count(), batch_size=1, return_as="generator")
     done = pool(joblib.delayed(_part)(*part) for part in parts)

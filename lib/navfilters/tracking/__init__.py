@@ -22,6 +22,7 @@ from navfilters.tracking.orbit import orbit
 from navfilters.tracking.sequential import Sequence, sequence, state_of
 from navfilters.tracking.sky import Sky, geodetic, sky
 from navfilters.tracking.stations import Sites, delay, observe, refraction, sites
+from navfilters.tracking.trials import STARTS, Kept, Trial, trial
 from navfilters.tracking.w3b import Flight, earth_field, flight
 
 __all__ = [
@@ -29,9 +30,11 @@ __all__ = [
     "LEAK",
     "LEAK_RATE",
     "MOTION",
+    "STARTS",
     "Flight",
     "Forces",
     "Harmonics",
+    "Kept",
     "Observations",
     "OrbitProblem",
     "Sequence",
@@ -39,6 +42,7 @@ __all__ = [
     "Sites",
     "Sky",
     "Solution",
+    "Trial",
     "delay",
     "density",
     "earth_field",
@@ -55,4 +59,5 @@ __all__ = [
     "sky",
     "solve",
     "state_of",
+    "trial",
 ]

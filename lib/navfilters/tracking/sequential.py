@@ -65,12 +65,10 @@ class Leg:
             before, x = x, self._step(self.start + i * h, x)
             over = _transition((before[..., :3] + x[..., :3]) / 2, h)
             F, W = over @ F, over @ W @ over.mT + grown
-        whole = np.zeros((2, *x.shape[:-1], n, n))
+        members = np.broadcast_shapes(x.shape[:-1], W.shape[:-2])
+        whole = np.zeros((2, *members, n, n))
         whole[0] = np.eye(n)
-        whole[0, ..., :9, :9] = F
-        whole = np.broadcast_to(whole, (2, *np.broadcast_shapes(x.shape[:-1], W.shape[:-2]), n, n))
-        whole = whole.copy()
-        whole[1, ..., :9, :9] = W
+        whole[0, ..., :9, :9], whole[1, ..., :9, :9] = F, W
         return x, whole[0], whole[1]
 
     def hessian(self, x: Array) -> Array:

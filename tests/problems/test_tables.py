@@ -1,0 +1,106 @@
+"""The table: complete, stored as it is computed, and read as it is written."""
+
+import math
+
+import pytest
+
+from navfilters.problems import (
+    CURES,
+    Cell,
+    best,
+    cells,
+    elsewhere,
+    own,
+    problems,
+    read,
+    reasons,
+    rows,
+    stored,
+    table,
+)
+
+FULL = problems(full=True)
+BY_NAME = {cure.name: cure for cure in CURES}
+STORED = read()
+
+
+def test_every_pair_is_stored_in_order():
+    pairs = list(own(STORED))
+    assert pairs == [(patient, cure.name) for patient in FULL for cure in CURES]
+
+
+def test_a_pair_has_either_numbers_or_a_reason():
+    for cell in STORED:
+        assert bool(cell.reason) == math.isnan(cell.ratio)
+        assert bool(cell.reason) == (cell.evaluations == 0)
+
+
+@pytest.mark.parametrize(
+    ("patient", "cure"),
+    [
+        ("three images", "EKF"),
+        ("three images", "B-UKF"),
+        ("pendulum", "UKF"),
+        ("fix, noisy", "polar"),
+    ],
+)
+def test_the_stored_table_is_what_the_library_computes(patient, cure):
+    fresh = cells(FULL[patient], BY_NAME[cure], stored.RUNS, scan=False)[0]
+    kept = own(STORED)[patient, cure]
+    for name in ("ratio", "median", "lost", "honesty", "nis", "covered"):
+        assert getattr(fresh, name) == pytest.approx(getattr(kept, name), rel=1e-3)
+    assert (fresh.honest, fresh.evaluations) == (kept.honest, kept.evaluations)
+
+
+def test_a_table_is_read_as_it_was_written(tmp_path):
+    three = {"three images": FULL["three images"]}
+    found = table(3, patients=three, cures=[BY_NAME["AREKF"], BY_NAME["B-EKF 3"]])
+    stored.write(tmp_path / "table.csv", found)
+    again = read(tmp_path / "table.csv")
+    assert [c.cure for c in again] == [c.cure for c in found]
+    assert again[0].ratio == pytest.approx(found[0].ratio, rel=1e-3)
+    assert again[-1].reason.startswith("needs a square H")
+
+
+def test_another_file_is_refused(tmp_path):
+    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(ValueError, match="path must be a table with the columns"):
+        read(tmp_path / "other.csv")
+
+
+def made(problem, cure, value, ratio, reason=""):
+    return Cell(problem, cure, value, ratio=ratio, reason=reason)
+
+
+def test_rows_have_the_texts_value_and_the_best_in_hindsight():
+    found = [
+        made("p", "AREKF", 0.2, 3.0),
+        made("p", "AREKF", 0.1, 2.0),
+        made("p", "more Q", 10.0, 5.0),
+        made("p", "more Q", 99.0, 4.0),
+    ]
+    shown = [(row.label, row.cells[0].ratio) for row in rows(found)]
+    assert shown == [("AREKF", 3.0), ("AREKF *", 2.0), ("more Q *", 4.0)]
+    assert best(found)["p", "AREKF"].value == 0.1
+
+
+def test_elsewhere_is_the_same_value_or_the_reason_why_not():
+    found = [
+        made("p", "Q", 1.0, 3.0),
+        made("q", "Q", 2.0, 9.0),
+        made("q", "Q", 1.0, 4.0),
+        made("r", "Q", None, math.nan, "no dynamics"),
+    ]
+    assert elsewhere(found, found[0], "q").ratio == 4.0
+    assert elsewhere(found, found[0], "r").reason == "no dynamics"
+    with pytest.raises(ValueError, match="must be in the table"):
+        elsewhere(found, found[0], "s")
+    assert reasons(found) == {"Q": {"no dynamics": ["r"]}}
+
+
+@pytest.mark.slow
+def test_processes_compute_what_one_does():
+    one = {"three images": FULL["three images"]}
+    few = [BY_NAME[name] for name in ("EKF", "B-EKF 1", "UKF", "AREKF", "gate")]
+    alone = table(3, patients=one, cures=few)
+    assert table(3, patients=one, cures=few, workers=2) == alone
