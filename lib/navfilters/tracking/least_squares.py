@@ -151,8 +151,10 @@ def solve(
         A = weight[..., None] * jacobian * free[..., None, None, :]
         A = A.reshape(*A.shape[:-3], -1, problem.size)
         size = np.linalg.norm(A, axis=-2)
+        still = (size == 0)[..., None]  # parameters that are not free, biases that are not seen
         size = np.where(size == 0, 1.0, size)
-        inverse = np.linalg.pinv(A / size[..., None, :]) / size[..., None]
+        inverse = np.linalg.pinv(A / size[..., None, :], rcond=1e-10) / size[..., None]
+        inverse = np.where(still, 0.0, inverse)
         y = np.where(seen, residuals * weight, 0.0)
         change = (inverse @ y.reshape(*y.shape[:-2], -1, 1))[..., 0]
         parameters = parameters + change

@@ -105,7 +105,14 @@ class Trial:
         return Gaussian(mean, deviation[..., None] ** 2 * np.eye(n))
 
     def fly(
-        self, estimator: Any, starts: Gaussian, *, density: Array = 0.0, hidden: Array = -1, **how
+        self,
+        estimator: Any,
+        starts: Gaussian,
+        *,
+        density: Array = 0.0,
+        hidden: Array = -1,
+        steps: int | None = None,
+        **how: Any,
     ) -> Kept:
         """A filter through the flight.
 
@@ -117,6 +124,8 @@ class Trial:
             Of a white acceleration, m^2/s^3.
         hidden : int or int array (...)
             A station that is not seen; -1 for none.
+        steps : int, optional
+            The first numbers alone.
         **how
             As of ``sweep``: workers, progress.
 
@@ -128,7 +137,7 @@ class Trial:
         model, z = self.sequence.model, self.sequence.without(hidden)
         if not np.shape(hidden):
             z = z.reshape(len(z), 1)
-        dynamics = self.sequence.noisy(density)
+        z, dynamics = z[:steps], self.sequence.noisy(density)
         flown = sweep(
             estimator, starts, z, model, dynamics=dynamics, z_per_step=True, record=kept, **how
         )
@@ -137,7 +146,8 @@ class Trial:
     def errors(self, flown: Kept) -> np.ndarray:
         """Distance from the reference after each number, m, (K, ...)."""
         position = flown.mean[..., :3]
-        truth = self.truth[:, :3].reshape(len(self.truth), *(1,) * (position.ndim - 2), 3)
+        truth = self.truth[: len(position), :3]
+        truth = truth.reshape(len(position), *(1,) * (position.ndim - 2), 3)
         return np.linalg.norm(position - truth, axis=-1)
 
     def surprises(self, flown: Kept, station: int) -> tuple[np.ndarray, np.ndarray]:

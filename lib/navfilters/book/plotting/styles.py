@@ -30,6 +30,7 @@ _DASHES: dict[str, Any] = {
 _VARIANTS = {
     "EKF": (EKF, "plain", "o"),
     "B-EKF 1": (EKF, "dashed", "s"),
+    "underweighted EKF": (EKF, "dash-dot-dot", "P"),
     "B-EKF 2": (EKF, "dotted", "^"),
     "B-EKF 3": (EKF, "dash-dot", "D"),
     "B-EKF 4": (EKF, "long dash", "v"),
