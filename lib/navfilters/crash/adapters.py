@@ -214,18 +214,28 @@ def _sampled(make: Callable[..., Any]) -> Adapted:
 
 
 def _cubature(kind: Any, n: int, m: int, hx: Any, fx: Any, calls: dict) -> Any:
-    """Filterpy's cubature filter keeps columns where the others keep vectors."""
-
-    class Columns(kind):  # type: ignore[misc, valid-type]
-        def predict(self) -> None:
-            self.x = np.reshape(self.x, (-1, 1))
-            super().predict()
-
-        def update(self, z: Array) -> None:
-            super().update(np.reshape(z, (-1, 1)))
-
-    theirs = Columns(n, m, 1.0, hx=hx, fx=fx)
+    theirs = kind(n, m, 1.0, hx=hx, fx=fx)
     if "residual_z" in calls:
         residual = calls["residual_z"]
         theirs.residual_z = lambda a, b: residual(a, b).reshape(-1, 1)
-    return theirs
+    return _Columns(theirs)
+
+
+class _Columns:
+    """Filterpy's cubature filter, which keeps columns where the others keep vectors."""
+
+    def __init__(self, theirs: Any) -> None:
+        self.theirs, self.x, self.P, self.Q, self.R = theirs, theirs.x, theirs.P, theirs.Q, theirs.R
+
+    def predict(self) -> None:
+        self.theirs.x, self.theirs.P, self.theirs.Q = self.x.reshape(-1, 1), self.P, self.Q
+        self.theirs.predict()
+        self._take()
+
+    def update(self, z: Array) -> None:
+        self.theirs.R = self.R
+        self.theirs.update(z.reshape(-1, 1))
+        self._take()
+
+    def _take(self) -> None:
+        self.x, self.P = self.theirs.x.reshape(-1), self.theirs.P
