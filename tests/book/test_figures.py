@@ -172,3 +172,20 @@ def test_every_control_has_a_name(browser, name):
         visit.page.wait_for_selector(".stage[data-ready]")
         nameless = visit.page.evaluate(NAMELESS)
         assert nameless == 0
+
+
+@pytest.mark.parametrize("by", ["click", "key"])
+def test_a_figure_opens_in_its_own_size(browser, by):
+    with browser.visit(DIVERGENCE, width=390) as visit:
+        page = visit.page
+        image = page.locator(".cell_output img[role=button]").first
+        if by == "click":
+            image.click()
+        else:
+            image.focus()
+            page.keyboard.press("Enter")
+        shown = page.locator("dialog.enlarged img")
+        shown.wait_for()
+        assert shown.bounding_box()["width"] >= 720 > image.bounding_box()["width"]
+        page.keyboard.press("Escape")
+        assert page.locator("dialog.enlarged[open]").count() == 0
