@@ -29,7 +29,7 @@ def expecting_noise(prior: Gaussian, model: Any) -> Moments:
 
     References
     ----------
-    bordonaro2014; there over predicted polar coordinates.
+    bordonaro2014, for the noise at the prediction; zhao2004, for the best linear update.
     """
     if not hasattr(model, "expected_noise"):
         raise TypeError(f"model must have expected_noise(prior); found {type(model).__name__}")
