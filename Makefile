@@ -37,7 +37,7 @@ test -z "$(2)" && $(1)/bin/python -c '$(WHOLE)' >/dev/null 2>&1 || $(PYTHON) -m 
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help book test unit coverage lint notebooks nbval elsewhere spread pages screens bench campaign lock clean
+.PHONY: help book test unit coverage lint notebooks nbval elsewhere spread pages screens pdf bench campaign lock clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1  /p' $(MAKEFILE_LIST) | awk '{printf "  make %-10s", $$1; $$1 = ""; print}'
@@ -85,6 +85,9 @@ notebooks: $(VENV)/.test  ## execute every notebook in place and refresh its sto
 
 screens: $(VENV)/.test $(BUILT)  ## every page as a picture: wide and 390 px, light and dark
 	$(BIN)/python tools/screens.py _build/html _build/screens
+
+pdf: $(VENV)/.test $(BUILT)  ## the whole book as _build/book.pdf, printed by Chromium
+	$(BIN)/python tools/pdf.py _build/html _build/book.pdf
 
 bench: $(BENCH)/.ready $(VENV)/.book  ## measure beside the peers and a C loop; store the results in benchmarks/
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/run.py
