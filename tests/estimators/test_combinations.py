@@ -8,6 +8,7 @@ import naive
 import numpy as np
 import pytest
 from naive import covariances
+from scipy.stats import chi2
 
 from navfilters import Filter, Gaussian, SigmaPoints, linearized, run, second_order, unscented
 from navfilters.estimators import (
@@ -20,8 +21,10 @@ from navfilters.estimators import (
     variants,
 )
 from navfilters.estimators.adaptive import AdaptiveNoise
+from navfilters.estimators.gated_inflation import GatedInflation
 from navfilters.estimators.limits import LIMITS
 from navfilters.estimators.robust import AdaptiveRobust, Robust
+from navfilters.estimators.strong_tracking import StrongTracking
 from navfilters.estimators.update import FORMS
 from navfilters.models import Linear
 
@@ -33,6 +36,8 @@ RULES = {
     "robust, violated": Robust(0.4),
     "adaptive robust": AdaptiveRobust(0.35, 0.7, 1.8),
     "adaptive noise": AdaptiveNoise(0.3, 1, 3, np.eye(3)),
+    "strong tracking": StrongTracking(),
+    "gated": GatedInflation(0.5, 3.0),
 }
 MOMENTS = {
     "linearised": linearized,
@@ -124,6 +129,14 @@ def textbook(filter_, prior, z, model, walk=None):
             S = H @ P @ H.T + R
             if np.linalg.eigvalsh(S - rule.alpha * np.outer(y, y)).min() <= 0:
                 P = rule.lam * P
+        if isinstance(rule, GatedInflation):
+            square = y @ np.linalg.inv(H @ P @ H.T + R) @ y
+            P = rule.factor * P if square > chi2.ppf(rule.probability, 3) else P
+        if isinstance(rule, StrongTracking):
+            W = np.zeros((3, 3)) if walk is None else walk.Q
+            old = P - W
+            excess = np.trace(np.outer(y, y) - R - H @ W @ H.T)
+            P = max(1.0, excess / np.trace(H @ old @ H.T)) * old + W
         P, R = limit(P, H, R, **{name: np.broadcast_to(v, 3)[i] for name, v in given.items()})
         mean, cov = naive.kalman(x, P, z[i], H, R)
         means.append(mean)
@@ -151,7 +164,7 @@ def test_on_a_linear_model_every_combination_is_its_kalman_filter(rule, variant,
                 got = filter_.step(filter_.init(prior), z, sensor, dynamics).estimate
                 assert size(got.mean - mean) < 1e-11 * size(mean)
                 assert size(got.cov - cov) < 1e-11 * size(cov)
-    if not isinstance(RULES[rule], AdaptiveRobust):  # its first step depends on z
+    if rule not in ("adaptive robust", "strong tracking", "gated"):  # their first steps depend on z
         limit = filter_.linear_limit(prior, z, model)
         mean, cov = textbook(filter_, prior, z, model)
         assert size(limit.mean - mean) < 1e-11 * size(mean)

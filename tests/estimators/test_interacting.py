@@ -1,5 +1,6 @@
 """The IMM against filterpy's, its limits, and what it says of its modes."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -166,12 +167,27 @@ class Curved(Swing):
             "probabilities must be at least 0 and sum to 1",
         ),
         (lambda: Modes([Swing(np.eye(2), np.eye(2))]), ValueError, "modes must be at least two"),
+        (
+            lambda: Modes([Swing(np.eye(2), np.eye(2)), Swing(np.eye(2), np.ones((4, 2, 2)))]),
+            ValueError,
+            r"modes must have Q with as many axes; found \[2, 3\]",
+        ),
         (lambda: Modes([Curved(np.eye(2), np.eye(2))] * 2), ValueError, "found retract in Curved"),
     ],
 )
 def test_parameters_are_checked_when_it_is_made(make, error, message):
     with pytest.raises(error, match=message):
         make()
+
+
+def test_modes_go_to_another_process_and_pass_for_the_first_elsewhere():
+    prior, z, sensor, modes = problem()
+    again = pickle.loads(pickle.dumps(modes))
+    options = {"dynamics": again, "z_per_step": True}
+    got = run(FILTERS["EKF"], prior, z, sensor, **options)
+    wanted = run(FILTERS["EKF"], prior, z, sensor, **options | {"dynamics": modes.modes[0]})
+    assert_array_equal(got.mean, wanted.mean)
+    assert not hasattr(modes, "propagate")
 
 
 def test_dynamics_that_are_not_modes_are_named():

@@ -19,12 +19,13 @@ class Modes:
     Parameters
     ----------
     modes : tuple of Dynamics
-        Of one state; they may differ in Q alone. None has ``retract``: means are averaged.
+        Of one state; they may differ in Q alone. None has ``retract``: means are averaged. If one
+        has batch axes all have them.
 
     Raises
     ------
     ValueError
-        Fewer than two.
+        Fewer than two; a ``retract``; a Q with batch axes beside one without.
     """
 
     modes: tuple[Any, ...]
@@ -39,6 +40,9 @@ class Modes:
                     "modes must have states that are vectors, of which a mean can be taken; found "
                     f"retract in {type(mode).__name__}"
                 )
+        axes = [np.ndim(mode.Q) for mode in self.modes]
+        if len(set(axes)) > 1:
+            raise ValueError(f"modes must have Q with as many axes; found {axes}")
 
     def at(self, k: Array) -> "Modes":
         """Those of step k."""
