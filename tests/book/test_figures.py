@@ -189,3 +189,20 @@ def test_a_figure_opens_in_its_own_size(browser, by):
         assert shown.bounding_box()["width"] >= 720 > image.bounding_box()["width"]
         page.keyboard.press("Escape")
         assert page.locator("dialog.enlarged[open]").count() == 0
+
+
+def test_the_banana_has_the_nees_that_the_chapter_computes(browser):
+    """9 + 3 kappa^2, with the rounded numbers that the page is given, and 600 runs about it."""
+    ledger = claims.load(ROOT / "book" / "claims.toml")
+    kappa2 = ledger["own-sar-nees-bend"].ours
+    with browser.visit("book/sar-navigation/consistency") as visit:
+        page = visit.page
+        page.wait_for_selector("[data-figure=banana] .stage[data-ready]")
+        expected = told(page, "banana", "expected")
+        assert expected == pytest.approx(9 + 3 * kappa2, rel=0.05)
+        assert told(page, "banana", "mean") == pytest.approx(expected, rel=0.25)
+        page.locator("[data-figure=banana] input").first.fill("0")
+        settled(page)
+        assert told(page, "banana", "expected") == 9
+        assert told(page, "banana", "mean") == pytest.approx(9, abs=0.7)
+        assert not visit.errors

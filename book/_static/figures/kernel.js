@@ -163,7 +163,7 @@
   }
 
   root.kernel = { FILTERS, POINTS, add, apply, bias, claimed, correct, deviations, distance, eigen, h,
-    inverse, jacobian, linearized, measurements, mul, norm, outer, residual, scale, secondOrder,
+    inverse, jacobian, linearized, measurements, mul, norm, normals, outer, residual, scale, secondOrder,
     sigmaPoints, symmetric, transpose, unscented, update };
   }
   build(root);

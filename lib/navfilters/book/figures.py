@@ -1,11 +1,13 @@
 """Figures that compute in the page: a place for one, and what it is told."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
 from html import escape
 from typing import Any
 
 from navfilters.book.plotting import STYLES
+from navfilters.estimators import FILTERS
 from navfilters.numerics.extras import missing
 
 try:
@@ -25,7 +27,7 @@ def computing(
         Of its script in ``book/_static/figures``.
     caption : str
         What to see.
-    setup : dataclass
+    setup : dataclass or mapping
         The experiment that it begins with: numbers, texts, and tuples of them.
     instead : bool
         Whether it takes the place of the cell before it, which stays for print.
@@ -36,7 +38,8 @@ def computing(
     -------
     IPython.display.HTML
     """
-    told = json.dumps(asdict(setup) | settings | {"styles": _strokes()}, sort_keys=True)
+    given = dict(setup) if isinstance(setup, Mapping) else asdict(setup)
+    told = json.dumps(given | settings | {"styles": _strokes()}, sort_keys=True)
     told = told.replace("<", "\\u003c")  # nothing in it ends the script
     place = ' data-instead="true"' if instead else ""
     return HTML(
@@ -47,9 +50,10 @@ def computing(
 
 
 def _strokes() -> dict[str, dict[str, str]]:
-    """Colour and SVG dashes of each filter."""
+    """Colour and SVG dashes of the ten filters that pages compute."""
     strokes = {}
-    for name, style in STYLES.items():
+    for name in FILTERS:
+        style = STYLES[name]
         dashes = () if style["linestyle"] == "-" else style["linestyle"][1]
         dash = " ".join(f"{2 * length:g}" for length in dashes)
         strokes[name] = {"color": style["color"], "dash": dash}
