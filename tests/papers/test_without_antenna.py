@@ -115,6 +115,8 @@ def test_a_delay_is_paid_for_by_its_state_considered_or_estimated():
 def test_bad_input():
     with pytest.raises(ValueError, match=r"measured must be one of .*; found 'radar'"):
         Trial("radar")
+    with pytest.raises(ValueError, match="trials must be at least one; found none"):
+        fly(SETUP, [])
     with pytest.raises(ValueError, match=r"sigma must be of .*; found \['height'\]"):
         fly_with_offsets(SETUP, [Trial()], {"height": 1.0})
 

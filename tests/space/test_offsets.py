@@ -1,6 +1,7 @@
 """Constant offsets as states: a manifold, an update and a flight beside the ones without them."""
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from navfilters.papers.pogorelsky2020 import CASES, simulate_images, truth
@@ -71,3 +72,11 @@ def test_offsets_stay_and_the_rest_moves_as_without_them():
     assert not F[:, :9, 9:].any()
     assert not F[:, 9:, :9].any()
     assert not W[:, 9:].any()
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"), [((-1,), "rows must be .* at least 0"), ((2, 2), r"different .*\(2, 2\)")]
+)
+def test_rows_are_different_numbers_from_0(rows, message):
+    with pytest.raises(ValueError, match=message):
+        OffsetImages(SarPass(SETUP.geometry, None), rows)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from navfilters.numerics import validation
 from navfilters.space import pose
 from navfilters.types import Array
 
@@ -55,10 +56,21 @@ class OffsetImages:
         Of the spacecraft's state alone.
     rows : tuple of int
         Which numbers of its y; one offset for each, in their units.
+
+    Raises
+    ------
+    ValueError
+        A row that is no number of one, or twice the same.
     """
 
     sensor: Any
     rows: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        rows = tuple(validation.whole_number("rows", row, 0) for row in self.rows)
+        if len(set(rows)) < len(rows):
+            raise ValueError(f"rows must be different ones; found {rows}")
+        object.__setattr__(self, "rows", rows)
 
     @property
     def R(self) -> Array:

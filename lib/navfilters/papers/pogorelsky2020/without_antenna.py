@@ -94,6 +94,11 @@ def fly(
     -------
     MonteCarlo
         With an axis of trials before that of the runs.
+
+    Raises
+    ------
+    ValueError
+        No trials; or as of ``monte_carlo``.
     """
     setup = of_case(case)
     flight = truth(setup, max(updates, setup.shortest)) if flight is None else flight
@@ -207,6 +212,8 @@ def _images(
     seed: int,
     flight: Truth,
 ) -> TimedImages:
+    if not trials:
+        raise ValueError("trials must be at least one; found none")
     which, intervals = _which(runs) * len(trials), len(flight.times) - 1
     white = white_errors(which, intervals, 4, seed)
     images = simulate_images(setup, which, seed, flight=flight)
