@@ -54,6 +54,7 @@ def test_every_module_is_imported_or_says_what_it_needs():
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == [
         "navfilters.book.plotting | plotting needs matplotlib: pip install navfilters[book]",
+        "navfilters.oracles.later_filters | this oracle needs mpmath: pip install navfilters[book]",
         "navfilters.oracles.perea2007 | this oracle needs mpmath: pip install navfilters[book]",
         "navfilters.oracles.sar_second_order | this oracle needs mpmath: pip install "
         "navfilters[book]",

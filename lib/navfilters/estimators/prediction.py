@@ -10,7 +10,7 @@ from navfilters.estimators.moments import (
     unscented,
 )
 from navfilters.estimators.sigma_points import SigmaPoints, behind, offsets, root_of
-from navfilters.numerics.small_matrices import matmul, outer_sum
+from navfilters.numerics.small_matrices import outer_sum
 from navfilters.numerics.state_derivatives import first_derivative, second_derivative
 from navfilters.types import Array, Dynamics, Gaussian
 
@@ -87,8 +87,7 @@ def predict_gaussian_second_order(estimate: Gaussian, dynamics: Dynamics, Q: Arr
     athans1968.
     """
     first = predict_linearized(estimate, dynamics, Q)
-    second = transition_hessian(dynamics, estimate.mean)
-    b, C = of_curvature(matmul(second, estimate.cov[..., None, :, :]))
+    b, C = of_curvature(transition_hessian(dynamics, estimate.mean), estimate.cov)
     return Gaussian(retract(dynamics, first.mean, b), first.cov + C)
 
 
