@@ -48,6 +48,7 @@ _VARIANTS = {
     "constant Q": (MIXED, "plain", "s"),
     "thrust as state": (MIXED, "dashed", "D"),
     "IMM": (MIXED, "dotted", "^"),
+    "IMM, strength": (MIXED, "dash-dot", "*"),
     "timed Q": (TOLD, "plain", "s"),
     "timed thrust vector": (TOLD, "dashed", "D"),
     "timed strength": (TOLD, "dash-dot", "*"),
