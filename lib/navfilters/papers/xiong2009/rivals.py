@@ -21,7 +21,7 @@ from navfilters.types import Array, Gaussian
 
 EKF = Filter(form="short")
 
-BURNS, END, AFTER = slice(73, 141), slice(180, 201), slice(73, 201)
+IN_BURNS, END, AFTER = slice(73, 141), slice(180, 201), slice(73, 201)
 """Updates from the first that sees fire to 2000 s after the last one; in the last 2000 s; all from
 the first that sees fire."""
 
