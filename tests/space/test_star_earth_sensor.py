@@ -109,6 +109,15 @@ def test_batch_axes_come_first(batch, m):
         assert_allclose(sensor.jacobian(x)[i], sensor.jacobian(x[i]), rtol=1e-14, atol=1e-16)
 
 
+def test_a_longer_state_adds_columns_of_zeros():
+    x = np.concatenate([states(), np.ones((8, 3))], axis=-1)
+    short = x[..., :6]
+    assert_array_equal(SENSOR.h(x), SENSOR.h(short))
+    for of_x, axes in ((SENSOR.jacobian, 1), (SENSOR.hessian, 2)):
+        wanted = np.pad(of_x(short), [(0, 0)] * 2 + [(0, 3)] * axes)
+        assert_array_equal(of_x(x), wanted)
+
+
 def test_it_is_a_measurement_model_of_the_filters():
     x = np.array([6.9e6, 1e5, 2e5, 0, 7e3, 3e3])
     prior = Gaussian(x, np.diag([1e4] * 3 + [1.0] * 3))

@@ -138,7 +138,7 @@ class InteractingModels:
         if not isinstance(dynamics, Modes):
             raise TypeError(f"dynamics must be Modes; found {type(dynamics).__name__}")
         mu, states = state.memory
-        modes = dynamics.at(k).modes
+        modes = dynamics.modes  # the filter asks each for its step
         if len(modes) != len(states):
             raise ValueError(
                 f"dynamics must have {len(states)} modes, as switching; found {len(modes)}"

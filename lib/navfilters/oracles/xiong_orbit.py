@@ -230,3 +230,42 @@ def robust(weights):
         return out, None
 
     return rule
+
+
+def two_models(z, sigma, stay, back, q_v):
+    """An IMM of two such filters, without and with a noise q_v: its estimates (201, seeds, 6).
+
+    ``stay`` and ``back`` are the probabilities that each model stays the true one.
+    """
+    always = ((0, 20000),)
+    x = np.tile(flight(())[0] - np.array([5e3] * 3 + [10.0] * 3), (2, z.shape[1], 1))
+    P = np.tile(start(), (2, z.shape[1], 1, 1))
+    mu = np.tile([0.99, 0.01], (z.shape[1], 1))
+    table, R = np.array([[stay, 1 - stay], [1 - back, back]]), sigma**2 * np.eye(2)
+
+    def merged(weights):
+        mean = np.einsum("si,isn->sn", weights, x)
+        off = x - mean
+        spread = P + off[..., :, None] * off[..., None, :]
+        return mean, np.einsum("si,isnm->snm", weights, spread)
+
+    path = [x[0]]
+    for k in range(200):
+        joint = mu[:, :, None] * table  # from i to j
+        mu = joint.sum(axis=1)
+        starts = [merged(joint[:, :, j] / mu[:, j : j + 1]) for j in (0, 1)]
+        moved = [predicted(starts[j][0], k, always, (0.0, q_v)[j], 2e-4) for j in (0, 1)]
+        fit = []
+        for j, (y, F, W) in enumerate(moved):
+            C = F @ starts[j][1] @ np.swapaxes(F, -1, -2) + W
+            H, e = differences(angles, y), z[k] - angles(y)
+            S = H @ C @ np.swapaxes(H, -1, -2) + R
+            K = C @ np.swapaxes(H, -1, -2) @ np.linalg.inv(S)
+            x[j], P[j] = y + (K @ e[..., None])[..., 0], C - K @ H @ C
+            square = np.einsum("si,sij,sj->s", e, np.linalg.inv(S), e)
+            fit.append(-0.5 * square - 0.5 * np.linalg.slogdet(S)[1])
+        fit = np.stack(fit, axis=1)
+        mu = mu * np.exp(fit - fit.max(axis=1, keepdims=True))
+        mu /= mu.sum(axis=1, keepdims=True)
+        path.append(merged(mu)[0])
+    return np.array(path)

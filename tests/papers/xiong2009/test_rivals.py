@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from navfilters import run
-from navfilters.estimators.robust import Robust
+from navfilters.estimators import Modes, Robust
 from navfilters.oracles import xiong_orbit as oracle
 from navfilters.papers.xiong2009 import (
     ESTIMATORS,
@@ -130,3 +130,20 @@ def test_the_command_prints_a_line_for_each_rival(capsys, monkeypatch):
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "variant D, 1 seeds"
     assert [line[:7].strip() for line in lines[2:]] == ["EKF", "timed Q"]
+
+
+def test_two_models_that_are_one_are_that_one():
+    """Also where the model differs from step to step: each is asked for its step once."""
+    flights = course(SHORT, range(2))
+    one = RIVALS["timed Q"]
+    flown = fly_rival(one, flights, SHORT)
+    motion = one.dynamics(SHORT)
+    twice = run(
+        RIVALS["IMM"].filter,
+        one.prior(SHORT),
+        flights.z[:, 0],
+        SHORT.sensor,
+        dynamics=Modes((motion, motion)),
+        z_per_step=True,
+    ).mean
+    assert_allclose(flights.states[:, 0] - twice, flown.error[:, 0, 0], rtol=1e-6, atol=1e-5)

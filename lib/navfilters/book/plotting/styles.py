@@ -63,6 +63,7 @@ _VARIANTS = {
     "strong tracking, softened": (FADING, "dashed", "D"),
     "constant Q": (MIXED, "plain", "s"),
     "thrust as state": (MIXED, "dashed", "D"),
+    "IMM, strength": (MIXED, "dash-dot", "*"),
     "timed Q": (TOLD, "plain", "s"),
     "timed thrust vector": (TOLD, "dashed", "D"),
     "timed strength": (TOLD, "dash-dot", "*"),

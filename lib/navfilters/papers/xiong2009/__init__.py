@@ -46,8 +46,8 @@ from navfilters.papers.xiong2009.monte_carlo import (
 from navfilters.papers.xiong2009.other_units import OtherUnits
 from navfilters.papers.xiong2009.rivals import (
     AFTER,
-    BURNS,
     END,
+    IN_BURNS,
     RIVALS,
     Course,
     Flight,
@@ -61,9 +61,9 @@ from navfilters.papers.xiong2009.true_flight import Truth, truth
 __all__ = [
     "AFTER",
     "ARCSECOND",
-    "BURNS",
     "END",
     "ESTIMATORS",
+    "IN_BURNS",
     "MILD",
     "RIVALS",
     "TURN",

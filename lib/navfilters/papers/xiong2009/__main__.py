@@ -10,7 +10,7 @@ import numpy as np
 from navfilters.numerics.extras import command
 from navfilters.papers.xiong2009.experiment import ESTIMATORS, VARIANTS
 from navfilters.papers.xiong2009.monte_carlo import rms_error
-from navfilters.papers.xiong2009.rivals import AFTER, BURNS, END, RIVALS, course, fly_rival
+from navfilters.papers.xiong2009.rivals import AFTER, END, IN_BURNS, RIVALS, course, fly_rival
 from navfilters.runs.progress import progress as progress_bar
 
 
@@ -72,7 +72,7 @@ def comparison(
     lines = [f"{'':26}" + "".join(f"{column:>12}" for column in columns)]
     for name, rival in progress(RIVALS.items()):
         flown = fly_rival(rival, flights, setup)
-        places = ((BURNS, 0), (END, 0), (AFTER, 1))
+        places = ((IN_BURNS, 0), (END, 0), (AFTER, 1))
         row = [flown.rms(updates)[0, k] for updates, k in places]
         row += [np.mean(flown.nees[updates, 0, k]) for updates, k in places]
         lines.append(f"{name:26}" + "".join(f"{x:12.4g}" for x in row))

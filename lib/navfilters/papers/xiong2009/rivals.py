@@ -21,7 +21,7 @@ from navfilters.types import Array, Gaussian
 
 EKF = Filter(form="short")
 
-BURNS, END, AFTER = slice(73, 141), slice(180, 201), slice(73, 201)
+IN_BURNS, END, AFTER = slice(73, 141), slice(180, 201), slice(73, 201)
 """Updates from the first that sees fire to 2000 s after the last one; in the last 2000 s; all from
 the first that sees fire."""
 
@@ -125,7 +125,8 @@ RIVALS = {
     "strong tracking, softened": Rival(_ruled(StrongTracking(rho=0.95, beta=5.0))),
     "constant Q": Rival(q_v=0.1),
     "thrust as state": Rival(thrust="vector", q_a=1e-3, memory=100.0),
-    "IMM": Rival(imm(0.999, 0.99), q_v=0.3),
+    "IMM": Rival(imm(0.9999, 0.999), q_v=10.0),
+    "IMM, strength": Rival(imm(0.9999, 0.999), thrust="strength"),
     "timed Q": Rival(told=True, q_v=3.0),
     "timed thrust vector": Rival(told=True, thrust="vector", q_a=0.01),
     "timed strength": Rival(told=True, thrust="strength"),
