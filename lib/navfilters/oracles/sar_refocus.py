@@ -48,8 +48,9 @@ class Pixels(NamedTuple):
         f = np.fft.fftfreq(len(self.values), 1 / self.prf)[:, None]
         s = (self.wavelength * f / 2) ** 2
         D, other = (np.sqrt(1 - s / v**2) for v in (self.velocity, self.velocity + faster))
-        turn = 4 * np.pi / self.wavelength * self.slant_range * (other - D)
-        return f, np.fft.fft(self.values, axis=0) * np.exp(1j * turn).astype(np.complex64)
+        less = (4 * np.pi / self.wavelength * (other - D)).astype(np.float32)  # some rad in all
+        turn = less * self.slant_range.astype(np.float32)
+        return f, np.fft.fft(self.values, axis=0) * np.exp(np.complex64(1j) * turn)
 
 
 def contrast(p: Pixels, faster: float) -> float:

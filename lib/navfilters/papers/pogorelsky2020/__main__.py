@@ -10,6 +10,7 @@ from navfilters.papers.pogorelsky2020.campaign import campaign_report, run_campa
 from navfilters.papers.pogorelsky2020.closed_loop import closed_table
 from navfilters.papers.pogorelsky2020.experiment import CASES
 from navfilters.papers.pogorelsky2020.open_loop import open_table
+from navfilters.papers.pogorelsky2020.own_images import own_report
 from navfilters.papers.pogorelsky2020.real_loop import report
 from navfilters.runs.progress import progress as progress_bar
 
@@ -77,7 +78,7 @@ def _counted(
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The open loop; the closed loop; all of the closed loop; or the closed loop on a product.
+    """The open loop; the closed loop, also with own images or all of it; or that on a product.
 
     Parameters
     ----------
@@ -92,6 +93,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--without-antenna",
         action="store_true",
         help="open-loop, with the plane of zero Doppler, with other errors, and with cures",
+    )
+    parser.add_argument(
+        "--own-images",
+        action="store_true",
+        help="both cases in closed loop, each run with images that it shares with no other",
     )
     _add_campaign(parser)
     _add_product(parser)
@@ -118,6 +124,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.stdout.write(f"{_on_product(chosen)}\n")
         return
     _counted(parser, chosen, least=2, runs=100)
+    if chosen.own_images:
+        sys.stdout.write(f"{own_report(chosen.runs, chosen.seed)}\n")
+        return
     if chosen.campaign is not None:
         sys.stdout.write(_campaign(parser, chosen))
         return

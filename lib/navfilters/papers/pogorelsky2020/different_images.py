@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -56,14 +57,13 @@ class DifferentImages:
         """
         found, attempts = list[Measurement](), list[Attempt]()
         for i, run in enumerate(self.runs):
-            table = self.tables(k, i)
             images = Images(
                 self.setup,
                 [run],
                 self.seed,
                 self.imaging,
                 self.geometry,
-                lambda _setup, _k, _imaging, table=table: table,
+                partial(_alone, self.tables(k, i)),
             )
             alone = NavigationState(*(part[i : i + 1] for part in state))
             found.append(images(k, alone))
@@ -82,3 +82,8 @@ class DifferentImages:
             )
         )
         return Measurement(*(np.concatenate(part) for part in zip(*found, strict=True)))
+
+
+def _alone(table: ImageTable, _setup: Setup, _k: int, _imaging: Imaging) -> ImageTable:
+    """The one table of a run."""
+    return table

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -121,7 +121,7 @@ def fly(
     *,
     shared: bool = False,
     seed: int = 0,
-    geometry: str = "predicted",
+    geometry: Literal["predicted", "nominal"] = "predicted",
 ) -> tuple[MonteCarlo, DifferentImages]:
     """One case in closed loop.
 
@@ -148,7 +148,7 @@ def fly(
     def table(k: int, i: int) -> ImageTable:
         return tables[k - 1][0 if shared else i % len(tables[k - 1])]
 
-    images = DifferentImages(setup, range(runs), table, seed, WHOLE, geometry)  # type: ignore[arg-type]
+    images = DifferentImages(setup, range(runs), table, seed, WHOLE, geometry)
     return monte_carlo(setup, UPDATES, runs, seed, measure=images), images
 
 

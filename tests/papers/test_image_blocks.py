@@ -1,0 +1,136 @@
+"""Blocks of an image, and loops whose runs have images of their own."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from navfilters.papers.pogorelsky2020 import (
+    CASES,
+    NOMINAL,
+    DifferentImages,
+    Images,
+    ImageTable,
+    Imaging,
+    acquire,
+    block_curves,
+    block_tables,
+    cut_blocks,
+    fly,
+    match_blocks,
+    monte_carlo,
+    own_report,
+    truth,
+)
+from navfilters.papers.pogorelsky2020 import own_images as module
+from navfilters.sar.images.autofocusing import sharpness
+from navfilters.sar.images.slant_image import Image
+from navfilters.sar.raw.radar import Radar
+from navfilters.space import ellipsoid_intersection
+
+SMALL = Imaging(
+    radar=Radar(wavelength=0.059, pulse_length=4e-6), lines=1024, samples=256, half_width=1800.0
+)
+
+
+def image(lines=64, samples=48):
+    pixels = np.arange(lines * samples).reshape(lines, samples) + 0j
+    return Image(pixels, 2.0, 1000.0, 8e5, 5.0)
+
+
+def test_blocks_know_where_they_are():
+    blocks = cut_blocks(image(), 32, 16)
+    assert len(blocks) == 6
+    assert_allclose(blocks[4].first_time, 2.0 + 32 / 1000.0)
+    assert_allclose(blocks[4].near_range, 8e5 + 16 * 5.0)
+    assert_array_equal(blocks[4].pixels, image().pixels[32:, 16:32])
+
+
+def test_what_is_left_over_is_cut_off_and_too_much_is_refused():
+    assert len(cut_blocks(image(), 40, 30)) == 1
+    with pytest.raises(ValueError, match="samples must be at most 48"):
+        cut_blocks(image(), 32, 64)
+
+
+@pytest.fixture(scope="module")
+def acquired():
+    return acquire(CASES["TC-1"], 1, SMALL)
+
+
+@pytest.mark.slow
+def test_the_criteria_see_the_truth_and_the_matches_find_it(acquired):
+    offset = np.array([-60.0, -30.0, 0.0, 30.0, 60.0])
+    curves = block_curves(acquired, offset, 512, 256)
+    assert curves.variance.shape == curves.entropy.shape == curves.drift.shape == (5, 2)
+    assert (curves.variance.argmax(axis=0) == 2).all()
+    assert (curves.entropy.argmin(axis=0) == 2).all()
+    assert (np.abs(curves.drift[2]) < 15).all()
+    matches = match_blocks(acquired, SMALL, 512, 256)
+    assert (np.linalg.norm(matches.error, axis=1) < 15).all()
+    tables = block_tables(acquired, curves, matches, "entropy")
+    assert_allclose(tables[1].sharpness, -curves.entropy[:, 1])
+    assert_allclose(tables[1].r_f[0] - tables[1].truth, matches.error[1])
+    assert tables[0].climb(acquired.speed + 40, (20.0, 5.0)).ended == "peak"
+
+
+@pytest.mark.slow
+def test_other_terrain_is_other_ground(acquired):
+    moved = acquire(CASES["TC-1"], 1, replace(SMALL, moved=(0.02, -0.01)))
+    east, north = np.meshgrid(np.linspace(-500, 500, 5), np.linspace(-500, 500, 5))
+    heights = [a.scene.height(east, north) for a in (acquired, moved)]
+    assert np.std(heights[0] - heights[1]) > 5
+    g = np.abs(moved.focuser.image(moved.effective(moved.speed), moved.slope).pixels) ** 2
+    assert sharpness(g) > 1
+
+
+def table(k, peak):
+    """A curve with a peak so far from the truth; the pixel without an error."""
+    known = truth(CASES["TC-1"], k)
+    x = known.x[k]
+    beam = replace(CASES["TC-1"].geometry, T_e_b=known.T_e_b[k]).boresight(NOMINAL)
+    r_f = ellipsoid_intersection(x[:3], beam)
+    true = float(np.linalg.norm(x[3:]))
+    speed = true + np.arange(-80.0, 81.0, 2.0)
+    return ImageTable(
+        speed,
+        -np.abs(speed - true - peak),
+        np.array([true]),
+        r_f[None],
+        np.array([20]),
+        float(np.linalg.norm(r_f - x[:3])),
+        r_f,
+        true,
+        np.array([7181.9, 1.054, 0.0]),
+        np.zeros(3),
+    )
+
+
+def test_runs_that_share_a_table_are_the_loop_of_before():
+    setup = replace(CASES["TC-2"], walk=False)
+    plain = Images(setup, 4, 0, SMALL, "predicted", lambda _setup, k, _imaging: table(k, 0.5))
+    own = DifferentImages(setup, range(4), lambda k, i: table(k, 0.5), 0, SMALL)
+    results = [monte_carlo(setup, 3, 4, 0, measure=m) for m in (plain, own)]
+    assert_array_equal(results[1].errors, results[0].errors)
+    assert_array_equal(own.log[2].speed, plain.log[2].speed)
+
+
+def test_each_run_has_its_own_set():
+    tables = [[table(k, 0.0), table(k, 6.0)] for k in (1, 2, 3)]
+    _, images = fly("TC-2", tables, 4)
+    apart = np.median(images.log[2].speed[1::2]) - np.median(images.log[2].speed[::2])
+    assert abs(apart - 6.0) < 2.5
+    _, shared = fly("TC-2", tables, 4, shared=True)
+    assert np.ptp(shared.log[2].speed) < 2.5
+
+
+def test_the_report(monkeypatch):
+    made = {
+        name: [[table(k, 0.1), table(k, 0.2)] for k in (1, 2, 3)]
+        for name in ("variance", "entropy")
+    }
+    monkeypatch.setattr(module, "own_tables", lambda runs, progress: made)
+    lines = own_report(4).splitlines()
+    assert len(lines) == 9
+    assert lines[8].startswith("TC-2, entropy, own")
+    assert lines[1].endswith(" 0")
