@@ -19,7 +19,7 @@ from navfilters.types import Array
 LEAK, BIASES = slice(6, 9), 9
 """Where leak and biases stand in the state."""
 
-FINENESS = 0.02
+FINENESS = 0.015
 """Longest step of the integrator, in units of sqrt(r^3 / mu)."""
 
 
