@@ -65,9 +65,7 @@ def test_the_tide_is_the_difference_of_two_pulls():
     with mpmath.workdps(40):
         body, place = ([mpmath.mpf(float(x)) for x in v] for v in (SUN, r))
         away = [b - p for b, p in zip(body, place, strict=True)]
-        pulls = [
-            [x / mpmath.sqrt(sum(y * y for y in v)) ** 3 for x in v] for v in (away, body)
-        ]
+        pulls = [[x / mpmath.sqrt(sum(y * y for y in v)) ** 3 for x in v] for v in (away, body)]
         exact = [float(f.SUN * (p - q)) for p, q in zip(*pulls, strict=True)]
     assert np.abs(f.tide(r, SUN, f.SUN) - exact).max() < 1e-6 * np.abs(exact).max()
 
@@ -84,7 +82,7 @@ def test_drag_brakes_against_the_turning_air():
     r, axis = np.array([6.6e6, 0, 0]), np.array([0.0, 0, 1])
     turning = np.array([0, f.OMEGA * 6.6e6, 0])
     assert np.abs(f.drag(r, turning, axis)).max() < 1e-25
-    fast = turning + [0, 7e3, 1e3]
+    fast = np.array([0, 7e3, 1e3]) + turning
     push = f.drag(r, fast, axis)
     rho = density(6.6e6 - f.RADIUS)
     assert np.abs(push - -rho / 2 * np.hypot(7e3, 1e3) * np.array([0, 7e3, 1e3])).max() < 1e-12

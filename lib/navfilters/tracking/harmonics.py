@@ -75,9 +75,7 @@ class Harmonics:
             N + 1
         )
         sums = products.reshape(*r.shape[:-1], N * (N + 1)) @ self._table
-        of_C, of_S, of_Cu, of_Su, of_Cr, of_Sr = np.moveaxis(
-            sums.reshape(*r.shape[:-1], 6, N), -2, 0
-        )
+        of_C, of_S, of_Cu, of_Su, of_Cr, of_Sr = (sums[..., N * i : N * (i + 1)] for i in range(6))
         s, t = powers(unit[..., 0], unit[..., 1], N)
         x = (of_C[..., 1:] * s[..., :-1] + of_S[..., 1:] * t[..., :-1]).sum(axis=-1)
         y = (of_S[..., 1:] * s[..., :-1] - of_C[..., 1:] * t[..., :-1]).sum(axis=-1)
@@ -99,6 +97,11 @@ def powers(x: Array, y: Array, count: int) -> tuple[Array, Array]:
     -------
     tuple of array (..., count)
     """
+    if x.dtype.kind != "c":
+        factors = np.ones((*x.shape, count), complex)
+        factors[..., 1:] = (x + 1j * y)[..., None]
+        both = np.cumprod(factors, axis=-1)
+        return both.real, both.imag
     s, t = np.empty((2, *x.shape, count), x.dtype)
     s[..., 0], t[..., 0] = 1.0, 0.0
     for m in range(1, count):

@@ -89,16 +89,16 @@ class OrbitProblem:
         station = self.observations.station
         step = 1e-20
         moved = parameters[:MOTION] + 1j * step * np.eye(MOTION)
-        of_motion = np.moveaxis(self._computed(moved).imag / step, 0, -1)
+        of_motion = np.moveaxis(self._computed(moved, 1e-9).imag / step, 0, -1)
         of_biases = np.zeros((len(station), 3, len(self.observations.stations), 3))
         for component in range(3):
             of_biases[np.arange(len(station)), component, station, component] = 1.0
         return np.concatenate([of_motion, of_biases.reshape(len(station), 3, -1)], axis=-1)
 
-    def _computed(self, motion: Array) -> Array:
+    def _computed(self, motion: Array, rtol: float = 1e-12) -> Array:
         flight = {"leak": motion[..., LEAK], "leak_rate": motion[..., LEAK_RATE]}
         forces = replace(self.forces, drag=motion[..., DRAG.start], **flight)
-        states = orbit(forces, motion[..., ORBIT], self.observations.time)
+        states = orbit(forces, motion[..., ORBIT], self.observations.time, rtol)
         return observe(states, self.sites, troposphere=self.troposphere)
 
 

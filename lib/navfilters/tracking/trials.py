@@ -62,7 +62,7 @@ class Trial:
     truth : array (K, 9)
         Position, velocity and leak of the reference at each number.
     sequence : Sequence
-        With the drag of the reference.
+        With the drag of the reference and without light, which does not matter.
     first : array (n,)
         The reference's state at the epoch.
     """
@@ -134,10 +134,13 @@ class Trial:
         Kept
             After each number, (K, ...). Where one was hidden the mean is the prediction.
         """
-        model, z = self.sequence.model, self.sequence.without(hidden)
-        if not np.shape(hidden):
-            z = z.reshape(len(z), 1)
-        z, dynamics = z[:steps], self.sequence.noisy(density)
+        model, dynamics = self.sequence.model, self.sequence.noisy(density)
+        if not np.ndim(hidden):  # all members see the same
+            z = self.sequence.without([hidden])[:steps, 0]
+        else:
+            axes = np.broadcast_shapes(np.shape(hidden), np.shape(density), starts.mean.shape[:-1])
+            hidden = np.reshape(hidden, (1,) * (len(axes) - np.ndim(hidden)) + np.shape(hidden))
+            z = self.sequence.without(hidden)[:steps]
         flown = sweep(
             estimator, starts, z, model, dynamics=dynamics, z_per_step=True, record=kept, **how
         )
@@ -190,7 +193,7 @@ def trial(flight: Flight, start: Array | None = None) -> Trial:
     free[LEAK_RATE], start[LEAK_RATE] = False, 0.0
     reference = solve(problem, start, free=free)
     found = reference.parameters
-    forces = replace(problem.forces, drag=found[DRAG.start])
+    forces = replace(problem.forces, drag=found[DRAG.start], radiation=0.0)
     first = state_of(found, problem.deviation)
     states = orbit(replace(forces, leak=first[LEAK]), first[:6], problem.observations.time)
     numbers = sequence(replace(problem, forces=forces), np.linalg.norm(states[:, :3], axis=-1))
