@@ -3,7 +3,7 @@
 from navfilters.problems.catalogue import problems
 from navfilters.problems.cures import Cure, UnfitError
 from navfilters.problems.evaluations import evaluations
-from navfilters.problems.later_cures import CURES
+from navfilters.problems.later_cures import CURES, LATER
 from navfilters.problems.noisier import Noisier
 from navfilters.problems.outcome import Outcome, treat
 from navfilters.problems.problem import LOST, Draw, Problem
@@ -15,6 +15,7 @@ from navfilters.problems.units import in_units
 
 __all__ = [
     "CURES",
+    "LATER",
     "LOST",
     "RUNS",
     "Cell",

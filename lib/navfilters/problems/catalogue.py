@@ -2,6 +2,7 @@
 
 from navfilters.problems.orbit_manoeuvre import orbit
 from navfilters.problems.problem import Problem
+from navfilters.problems.real_satellite import satellite
 from navfilters.problems.sar_images import images
 from navfilters.problems.shaken_pendulum import pendulum
 from navfilters.problems.static_fix import static_fix
@@ -13,7 +14,8 @@ def problems(*, full: bool = False) -> dict[str, Problem]:
     Parameters
     ----------
     full : bool
-        The paper's 1000 updates of the fix; otherwise 200.
+        The paper's 1000 updates of the fix, otherwise 200; and the real satellite, which needs
+        astropy.
 
     Returns
     -------
@@ -31,4 +33,5 @@ def problems(*, full: bool = False) -> dict[str, Problem]:
         images("images, TC-2", "TC-2"),
         images("three images", "TC-1", 3),
     )
-    return {problem.name: problem for problem in every}
+    real = (satellite(),) if full else ()
+    return {problem.name: problem for problem in (*every, *real)}

@@ -125,12 +125,13 @@ def treat(
         error = problem.error(seen[window], truth[window])
         square = np.mean(np.sum(error[..., list(problem.judged)] ** 2, axis=-1), axis=0)
         each = np.sqrt(np.broadcast_to(square, batch))
-        last = nees(told.error(mean[-1], draw.truth[front][-1]), cov[-1])
+        last = _nees(problem, told.error(mean[-1], draw.truth[front][-1]), cov[-1])
     each, last = np.where(np.isfinite(each), each, np.inf), np.broadcast_to(last, batch)
-    reference, dof = problem.reference(runs, seed), cov.shape[-1]
+    reference = problem.reference(runs, seed)
+    dof = cov.shape[-1] if problem.tested is None else len(problem.tested)
     counted = np.isfinite(last)
     total, count = np.where(counted, last, 0.0).sum(axis=-1), counted.sum(axis=-1)
-    low, high = chi_square_band(dof, runs, CONFIDENCE)
+    low, high = chi_square_band(dof, 1 if problem.repeated else runs, CONFIDENCE)
     quantile = chi_square_band(dof, 1, 0.9)[1]  # 95 % are below it
     return Outcome(
         rms=np.sqrt(np.mean(each**2, axis=-1)),
@@ -151,6 +152,14 @@ def _mean_nis(innovation: Array | None, S: Array | None) -> Array:
         return np.array(np.nan)
     with np.errstate(all="ignore"):
         return np.nanmean(nis(innovation[1:], S[1:]), axis=(0, -1)) / S.shape[-1]
+
+
+def _nees(problem: Problem, error: Array, cov: Array) -> Array:
+    """Of the components that are tested."""
+    if problem.tested is None:
+        return nees(error, cov)
+    kept = np.array(problem.tested)
+    return nees(error[..., kept], cov[..., kept[:, None], kept])
 
 
 def _kept(state: Any) -> Any:

@@ -57,6 +57,10 @@ class Problem:
         What the filter knows of the motion.
     burning : bool array (steps,), optional
         Steps in which a force acts that the filter does not know.
+    tested : tuple of int, optional
+        Components of the error of which the NEES is; all by default.
+    repeated : bool
+        Whether all runs have the same measurements, so that their NEES are no independent ones.
     back : callable, optional
         From this problem's states to those of the problem that it stands for, if a cure writes the
         state in another way.
@@ -71,6 +75,8 @@ class Problem:
     since: int
     dynamics: Any = None
     burning: Array | None = None
+    tested: tuple[int, ...] | None = None
+    repeated: bool = False
     back: Callable[[Array], Array] | None = None
 
     def __post_init__(self) -> None:

@@ -14,6 +14,9 @@ from navfilters.problems.later_cures import CURES
 from navfilters.problems.outcome import Outcome, treat
 from navfilters.problems.problem import Problem
 
+FEW = 3
+"""Runs of a problem whose runs share their measurements."""
+
 TOGETHER = 4
 """Cures of one problem that a process tries in one go."""
 
@@ -67,6 +70,7 @@ def cells(
     problem : Problem
     cure : Cure
     runs : int
+        At most ``FEW`` are flown where runs share their measurements.
     seed : int
     scan : bool
         Whether the other values are tried.
@@ -76,6 +80,7 @@ def cells(
     list of Cell
         That of the cure's own value first.
     """
+    runs = min(runs, FEW) if problem.repeated else runs
     try:
         believed, estimator = cure.apply(problem, cure.value)
     except UnfitError as reason:
