@@ -17,7 +17,7 @@ from navfilters.papers.pogorelsky2020 import (
     block_curves,
     block_tables,
     cut_blocks,
-    fly,
+    fly_own_images,
     match_blocks,
     monte_carlo,
     own_report,
@@ -117,10 +117,10 @@ def test_runs_that_share_a_table_are_the_loop_of_before():
 
 def test_each_run_has_its_own_set():
     tables = [[table(k, 0.0), table(k, 6.0)] for k in (1, 2, 3)]
-    _, images = fly("TC-2", tables, 4)
+    _, images = fly_own_images("TC-2", tables, 4)
     apart = np.median(images.log[2].speed[1::2]) - np.median(images.log[2].speed[::2])
     assert abs(apart - 6.0) < 2.5
-    _, shared = fly("TC-2", tables, 4, shared=True)
+    _, shared = fly_own_images("TC-2", tables, 4, shared=True)
     assert np.ptp(shared.log[2].speed) < 2.5
 
 

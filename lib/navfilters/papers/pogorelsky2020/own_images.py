@@ -114,7 +114,7 @@ def own_tables(
     return found
 
 
-def fly(
+def fly_own_images(
     case: str,
     tables: list[list[ImageTable]],
     runs: int,
@@ -173,7 +173,7 @@ def own_report(runs: int = 100, seed: int = 0, *, progress: Callable = bar) -> s
     for case in CASES:
         for name, of_name in tables.items():
             for shared in (True, False):
-                flown, images = fly(case, of_name, runs, shared=shared, seed=seed)
+                flown, images = fly_own_images(case, of_name, runs, shared=shared, seed=seed)
                 lines.append(_line(case, name, shared, flown, images))
     return "\n".join(lines)
 
