@@ -169,7 +169,7 @@ class Trial:
         rows = np.flatnonzero(self.sequence.station == station)
         found = []
         for k in rows:
-            sensor = self.sequence.model.at(k)
+            sensor = self.sequence.model.at(int(k))
             found.append(sensor.residual(self.sequence.z[k], sensor.h(flown.mean[k]))[..., 0])
         return np.array(found), rows
 
