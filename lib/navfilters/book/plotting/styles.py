@@ -50,7 +50,6 @@ _VARIANTS = {
     "IPLF": (CORRECTED, "dotted", "^"),
     "RC-EKF": (CORRECTED, "dash-dot", "D"),
     "RC-UKF": (CORRECTED, "long dash", "v"),
-    "STF": (ROBUST, "dotted", "^"),
     "gate": (ROBUST, "dash-dot", "D"),
     "IMM": (LATER, "plain", "o"),
     "VB": (LATER, "dashed", "s"),
