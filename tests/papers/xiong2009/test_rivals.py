@@ -147,3 +147,15 @@ def test_two_models_that_are_one_are_that_one():
         z_per_step=True,
     ).mean
     assert_allclose(flights.states[:, 0] - twice, flown.error[:, 0, 0], rtol=1e-6, atol=1e-5)
+
+
+@pytest.mark.slow
+def test_an_imm_written_apart_flies_the_same():
+    """Through the whole flight: within metres, where both are kilometres off."""
+    A = Setup()
+    flights = course(A, range(2), burns=(True,))
+    flown = fly_rival(RIVALS["IMM"], flights, A).error[:, 0, 0, :, :3]
+    x = oracle.two_models(flights.z[:, 0], float(A.sigma), 0.9999, 0.999, 10.0)
+    apart = flown - (flights.states[:, 0] - x)[..., :3]
+    assert np.abs(apart).max() < 2e-3 * np.abs(flown[1:]).max()
+    assert np.abs(apart[180:]).max() < 20
