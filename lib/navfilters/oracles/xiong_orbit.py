@@ -249,7 +249,7 @@ def two_models(z, sigma, stay, back, q_v):
         spread = P + off[..., :, None] * off[..., None, :]
         return mean, np.einsum("si,isnm->snm", weights, spread)
 
-    path = [x[0]]
+    path = [x[0].copy()]
     for k in range(200):
         joint = mu[:, :, None] * table  # from i to j
         mu = joint.sum(axis=1)
