@@ -151,7 +151,7 @@ def test_two_models_that_are_one_are_that_one():
 
 @pytest.mark.slow
 def test_an_imm_written_apart_flies_the_same():
-    """Metres from each other at the end; in the burns the probabilities magnify small differences."""
+    """Metres apart at the end; in the burns the probabilities magnify small differences."""
     A = Setup()
     flights = course(A, range(2), burns=(True,))
     flown = fly_rival(RIVALS["IMM"], flights, A).error[:, 0, 0, :, :3]
