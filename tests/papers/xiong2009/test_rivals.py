@@ -147,3 +147,15 @@ def test_two_models_that_are_one_are_that_one():
         z_per_step=True,
     ).mean
     assert_allclose(flights.states[:, 0] - twice, flown.error[:, 0, 0], rtol=1e-6, atol=1e-5)
+
+
+@pytest.mark.slow
+def test_an_imm_written_apart_flies_the_same():
+    """Metres apart at the end; in the burns the probabilities magnify small differences."""
+    A = Setup()
+    flights = course(A, range(2), burns=(True,))
+    flown = fly_rival(RIVALS["IMM"], flights, A).error[:, 0, 0, :, :3]
+    x = oracle.two_models(flights.z[:, 0], float(A.sigma), 0.9999, 0.999, 10.0)
+    apart = flown - (flights.states[:, 0] - x)[..., :3]
+    assert np.abs(apart).max() < 0.03 * np.abs(flown).max()
+    assert np.abs(apart[180:]).max() < 20
