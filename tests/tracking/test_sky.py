@@ -102,11 +102,7 @@ def test_places_are_on_the_ellipsoid():
     a, f = 6378137.0, 1 / 298.257223563
     N = a / np.sqrt(1 - f * (2 - f) * np.sin(lat) ** 2)
     across = (N + height) * np.cos(lat)
-    expected = [
-        across * np.cos(lon),
-        across * np.sin(lon),
-        ((1 - f) ** 2 * N + height) * np.sin(lat),
-    ]
+    expected = [across * np.cos(lon), across * np.sin(lon), ((1 - f) ** 2 * N + height) * np.sin(lat)]
     assert np.abs(position - expected).max() < 1e-6
     assert np.abs(axes @ axes.T - np.eye(3)).max() < 1e-15
     higher = geodetic(lat, lon, height + 10.0)[0]
