@@ -74,6 +74,41 @@ def test_runs_without_a_number_are_lost_and_the_others_do_not_notice():
     assert np.isfinite(found.median)
 
 
+def test_runs_that_share_their_measurements_are_one_run_to_the_band():
+    shared = replace(LINEAR, repeated=True)
+    alone, many = treat(LINEAR, FILTERS["EKF"], 1), treat(shared, FILTERS["EKF"], 30)
+    assert many.band == alone.band
+    assert treat(LINEAR, FILTERS["EKF"], 30).band != alone.band
+
+
+def test_only_what_is_tested_counts_for_honesty():
+    first = replace(LINEAR, tested=(0,))
+    found = treat(first, FILTERS["EKF"], 400)
+    assert found.dof == 1
+    assert float(found.honesty) == pytest.approx(1, abs=0.2)
+
+
+def test_another_state_is_judged_in_the_problems_own():
+    """The same filter, its state doubled."""
+    double = replace(
+        LINEAR,
+        draw=lambda runs, seed: doubled(drawn(runs, seed)),
+        model=Linear(H / 2, R),
+        back=lambda x: x / 2,
+    )
+    plain, other = (
+        treat(LINEAR, FILTERS["EKF"], 20),
+        treat(LINEAR, FILTERS["EKF"], 20, believed=double),
+    )
+    for name in ("rms", "nees", "nis"):
+        np.testing.assert_allclose(getattr(other, name), getattr(plain, name), rtol=1e-9)
+
+
+def doubled(draw):
+    prior = Gaussian(2 * draw.prior.mean, 4 * draw.prior.cov)
+    return draw._replace(prior=prior, truth=2 * draw.truth)
+
+
 def test_evaluations_are_counted():
     patients = problems()
     assert evaluations(patients["fix, noisy"], FILTERS["EKF"]) == 2  # h and its Jacobian

@@ -80,3 +80,16 @@ def test_a_step_that_does_not_divide_the_interval_is_refused():
 def test_a_window_beyond_the_end_is_refused():
     with pytest.raises(ValueError, match="since must be 1 to 5; found 6"):
         Problem("short", lambda runs, seed: None, None, 5, (0,), "m", 6)
+
+
+@pytest.mark.slow
+def test_the_satellite_is_told_no_leak_and_judged_by_the_batch_solution():
+    pytest.importorskip("astropy")
+    from navfilters.problems.real_satellite import satellite
+
+    patient = satellite()
+    draw = patient.drawn(2)
+    assert (draw.prior.cov[6:9] == 0).all()
+    assert np.linalg.norm(draw.truth[-1, 0, 6:9]) > 1e-6  # and there is one
+    rest = draw.z[:, 0, 0] - [patient.model.at(k).h(x[0])[0] for k, x in enumerate(draw.truth[1:])]
+    assert np.sqrt(np.mean(rest**2)) < 3  # of the numbers' deviations, by the batch solution

@@ -264,13 +264,8 @@ def two_models(z, sigma, stay, back, q_v):
             x[j], P[j] = y + (K @ e[..., None])[..., 0], C - K @ H @ C
             square = np.einsum("si,sij,sj->s", e, np.linalg.inv(S), e)
             fit.append(-0.5 * square - 0.5 * np.linalg.slogdet(S)[1])
-<<<<<<< HEAD
-        weight = np.stack(fit, axis=1)
-        mu = mu * np.exp(weight - weight.max(axis=1, keepdims=True))
-=======
         likely = np.stack(fit, axis=1)
         mu = mu * np.exp(likely - likely.max(axis=1, keepdims=True))
->>>>>>> xiong
         mu /= mu.sum(axis=1, keepdims=True)
         path.append(merged(mu)[0])
     return np.array(path)
