@@ -53,6 +53,7 @@ def test_every_module_is_imported_or_says_what_it_needs():
         """)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == [
+        "navfilters.book.figures | plotting needs matplotlib: pip install navfilters[book]",
         "navfilters.book.plotting | plotting needs matplotlib: pip install navfilters[book]",
         "navfilters.oracles.later_filters | this oracle needs mpmath: pip install navfilters[book]",
         "navfilters.oracles.perea2007 | this oracle needs mpmath: pip install navfilters[book]",

@@ -65,9 +65,7 @@ def test_the_tide_is_the_difference_of_two_pulls():
     with mpmath.workdps(40):
         body, place = ([mpmath.mpf(float(x)) for x in v] for v in (SUN, r))
         away = [b - p for b, p in zip(body, place, strict=True)]
-        pulls = [
-            [x / mpmath.sqrt(sum(y * y for y in v)) ** 3 for x in v] for v in (away, body)
-        ]
+        pulls = [[x / mpmath.sqrt(sum(y * y for y in v)) ** 3 for x in v] for v in (away, body)]
         exact = [float(f.SUN * (p - q)) for p, q in zip(*pulls, strict=True)]
     assert np.abs(f.tide(r, SUN, f.SUN) - exact).max() < 1e-6 * np.abs(exact).max()
 

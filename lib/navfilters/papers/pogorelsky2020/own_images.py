@@ -178,9 +178,7 @@ def own_report(runs: int = 100, seed: int = 0, *, progress: Callable = bar) -> s
     return "\n".join(lines)
 
 
-def _line(
-    case: str, name: str, shared: bool, flown: MonteCarlo, images: DifferentImages
-) -> str:
+def _line(case: str, name: str, shared: bool, flown: MonteCarlo, images: DifferentImages) -> str:
     errors, covariances = flown.errors[UPDATES], flown.covariances[UPDATES]
     kept = ~np.any([attempt.absent for attempt in images.log], axis=0)
     total = mean_nees(errors[kept], covariances[kept], runs_axis=0)

@@ -77,7 +77,9 @@ def look_drift(image: Image, doppler_centroid: float = 0.0) -> Drift:
     return Drift(place / image.prf, means[1] - means[0])
 
 
-def drift_to_velocity(drift: Drift, velocity: float, slant_range: float, wavelength: float) -> float:
+def drift_to_velocity(
+    drift: Drift, velocity: float, slant_range: float, wavelength: float
+) -> float:
     """Assumed minus true effective velocity.
 
     A velocity that is dV too fast leaves the phase pi R wavelength f^2 dV / V^3, which moves what
