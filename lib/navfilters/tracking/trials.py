@@ -7,8 +7,9 @@ import numpy as np
 
 from navfilters.runs import sweep
 from navfilters.tracking.least_squares import DRAG, LEAK_RATE, Solution, solve
+from navfilters.tracking.legs import BIASES, LEAK
 from navfilters.tracking.orbit import orbit
-from navfilters.tracking.sequential import BIASES, LEAK, Sequence, sequence, state_of
+from navfilters.tracking.sequential import Sequence, sequence, state_of
 from navfilters.tracking.w3b import Flight
 from navfilters.types import Array, Gaussian
 
@@ -169,7 +170,7 @@ class Trial:
         rows = np.flatnonzero(self.sequence.station == station)
         found = []
         for k in rows:
-            sensor = self.sequence.model.at(k)
+            sensor = self.sequence.model.at(int(k))
             found.append(sensor.residual(self.sequence.z[k], sensor.h(flown.mean[k]))[..., 0])
         return np.array(found), rows
 
