@@ -23,7 +23,7 @@ def test_the_reference_flies_along_its_own_truth(real):
         assert np.abs(x[:3] - real.truth[k, :3]).max() < 0.5
 
 
-@pytest.mark.parametrize("k", [0, 1, 2, 327])
+@pytest.mark.parametrize("k", [0, 1, 2, pytest.param(327, marks=pytest.mark.slow)])
 def test_a_transition_is_the_derivative_of_the_motion(real, k):
     before = real.truth[k - 1] if k else real.first[:9]
     x = np.concatenate([before, real.first[9:]])

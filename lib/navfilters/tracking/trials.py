@@ -7,8 +7,9 @@ import numpy as np
 
 from navfilters.runs import sweep
 from navfilters.tracking.least_squares import DRAG, LEAK_RATE, Solution, solve
+from navfilters.tracking.legs import BIASES, LEAK
 from navfilters.tracking.orbit import orbit
-from navfilters.tracking.sequential import BIASES, LEAK, Sequence, sequence, state_of
+from navfilters.tracking.sequential import Sequence, sequence, state_of
 from navfilters.tracking.w3b import Flight
 from navfilters.types import Array, Gaussian
 
