@@ -111,3 +111,12 @@ def test_places_are_on_the_ellipsoid():
     north = axes @ (geodetic(lat + 1e-6, lon, height)[0] - position)
     assert north[1] > 6
     assert np.abs(north[[0, 2]]).max() < 1e-5
+
+
+def test_nothing_is_asked_of_the_network(monkeypatch):
+    def refused(*args, **kwargs):
+        raise OSError("no network")
+
+    monkeypatch.setattr("socket.socket.connect", refused)
+    monkeypatch.setattr("socket.getaddrinfo", refused)
+    assert np.isfinite(sky(EPOCH, 600.0).at(0.0)[0]).all()
