@@ -42,6 +42,9 @@ def bare(code, *arguments):
     )
 
 
+MPMATH = "this oracle needs mpmath: pip install navfilters[book]"
+
+
 def test_every_module_is_imported_or_says_what_it_needs():
     done = bare("""
         import importlib, pkgutil, navfilters
@@ -55,12 +58,13 @@ def test_every_module_is_imported_or_says_what_it_needs():
     assert done.stdout.splitlines() == [
         "navfilters.book.figures | plotting needs matplotlib: pip install navfilters[book]",
         "navfilters.book.plotting | plotting needs matplotlib: pip install navfilters[book]",
-        "navfilters.oracles.later_filters | this oracle needs mpmath: pip install navfilters[book]",
-        "navfilters.oracles.perea2007 | this oracle needs mpmath: pip install navfilters[book]",
-        "navfilters.oracles.sar_second_order | this oracle needs mpmath: pip install "
-        "navfilters[book]",
-        "navfilters.oracles.sar_trn | this oracle needs mpmath: pip install navfilters[book]",
-        "navfilters.oracles.two_by_two | this oracle needs mpmath: pip install navfilters[book]",
+        f"navfilters.oracles.later_filters | {MPMATH}",
+        f"navfilters.oracles.perea2007 | {MPMATH}",
+        f"navfilters.oracles.sar_information | {MPMATH}",
+        f"navfilters.oracles.sar_second_order | {MPMATH}",
+        f"navfilters.oracles.sar_trn | {MPMATH}",
+        f"navfilters.oracles.two_by_two | {MPMATH}",
+        f"navfilters.oracles.uneven_gravity | {MPMATH}",
         'navfilters.runs.compiled | engine="jax" needs JAX: pip install navfilters[jax]',
     ]
 

@@ -144,7 +144,7 @@ def listing(found: Sequence[Row]) -> str:
     Returns
     -------
     str
-        HTML; the paragraph of "B-EKF 1 *" has the id "cure-b-ekf-1-best".
+        HTML; the paragraph of "B-EKF 1", say, has the id "cure-b-ekf-1".
     """
     words = {-1: "cautious", 0: "honest", 1: "over-confident"}
     paragraphs = []

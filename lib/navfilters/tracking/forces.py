@@ -132,7 +132,7 @@ def tide(r: Array, body: Array, mu: float) -> Array:
 
 
 def drag(r: Array, v: Array, axis: Array) -> Array:
-    """Acceleration by air that turns with the Earth, for 1 m^2/kg: -rho |u| u / 2.
+    """Acceleration by air that turns with the Earth, for 1 m^2/kg: half density by speed squared.
 
     Parameters
     ----------

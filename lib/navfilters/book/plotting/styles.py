@@ -25,12 +25,13 @@ _DASHES: dict[str, Any] = {
     "dash-dot": (0, (6, 2, 1, 2)),
     "long dash": (0, (11, 3)),
     "dash-dot-dot": (0, (6, 2, 1, 2, 1, 2)),
+    "short dash": (0, (2.5, 1.5)),
 }
 
 _VARIANTS = {
     "EKF": (EKF, "plain", "o"),
     "B-EKF 1": (EKF, "dashed", "s"),
-    "underweighted EKF": (EKF, "dash-dot-dot", "P"),
+    "underweighted EKF": (EKF, "short dash", "X"),
     "B-EKF 2": (EKF, "dotted", "^"),
     "B-EKF 3": (EKF, "dash-dot", "D"),
     "B-EKF 4": (EKF, "long dash", "v"),

@@ -174,9 +174,9 @@ def exact(
     Parameters
     ----------
     prior, z, model, updates
-        As of :func:`follow`; the prior as of :class:`ExactPosterior`.
+        As of :func:`follow`; the prior as of ``ExactPosterior``.
     **options
-        Those of :class:`ExactPosterior`.
+        Those of its ``ExactPosterior``.
 
     Returns
     -------
