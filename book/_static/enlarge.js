@@ -4,16 +4,17 @@
   function begin() {
     const images = document.querySelectorAll(".bd-article .cell_output img, .bd-article figure img:not(.sd-card-img-top)");
     if (!images.length) return;
-    const dialog = document.createElement("dialog"), large = document.createElement("img");
+    const dialog = document.createElement("dialog");
     dialog.className = "enlarged";
     dialog.setAttribute("aria-label", "figure in its own size");
-    dialog.append(large);
     dialog.addEventListener("click", () => dialog.close());
     document.body.append(dialog);
     for (const image of images) {
       const open = () => {
+        const large = new Image();
         large.src = image.currentSrc || image.src;
         large.alt = image.alt;
+        dialog.replaceChildren(large);
         dialog.showModal();
       };
       image.tabIndex = 0;

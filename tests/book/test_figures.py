@@ -188,7 +188,7 @@ def test_a_figure_opens_in_its_own_size(browser, by):
         shown.wait_for()
         assert shown.bounding_box()["width"] >= 720 > image.bounding_box()["width"]
         page.keyboard.press("Escape")
-        assert page.locator("dialog.enlarged[open]").count() == 0
+        page.wait_for_selector("dialog.enlarged:not([open])", state="attached", timeout=5000)
 
 
 def test_the_banana_has_the_nees_that_the_chapter_computes(browser):

@@ -91,5 +91,7 @@ def test_the_satellite_is_told_no_leak_and_judged_by_the_batch_solution():
     draw = patient.drawn(2)
     assert (draw.prior.cov[6:9] == 0).all()
     assert np.linalg.norm(draw.truth[-1, 0, 6:9]) > 1e-6  # and there is one
-    rest = draw.z[:, 0, 0] - [patient.model.at(k).h(x[0])[0] for k, x in enumerate(draw.truth[1:])]
+    sensors = [patient.model.at(k) for k in range(patient.steps)]
+    seen = zip(sensors, draw.z[:, 0], draw.truth[1:, 0], strict=True)
+    rest = np.array([sensor.residual(z, sensor.h(x)) for sensor, z, x in seen])
     assert np.sqrt(np.mean(rest**2)) < 3  # of the numbers' deviations, by the batch solution
