@@ -8,6 +8,7 @@
     dialog.className = "enlarged";
     dialog.setAttribute("aria-label", "figure in its own size");
     dialog.addEventListener("click", () => dialog.close());
+    dialog.addEventListener("keydown", (event) => { if (event.key === "Escape") dialog.close(); }); // a theme's own handler may keep the browser's from it
     document.body.append(dialog);
     for (const image of images) {
       const open = () => {
