@@ -81,13 +81,40 @@ class Check:
 
 
 def history(filter: Any, prior: Gaussian, z: Any, model: Any, **options: Any) -> Gaussian:
-    """The estimates of a run over measurements (steps, ..., m), the prior first."""
+    """The estimates of a run, without warnings of a filter that fails.
+
+    Parameters
+    ----------
+    filter : what ``run`` takes
+    prior : Gaussian
+        mean (..., n), cov (..., n, n).
+    z : array (steps, ..., m)
+    model : MeasurementModel
+    **options
+        Of ``run``.
+
+    Returns
+    -------
+    Gaussian
+        mean (steps + 1, ..., n), the prior first.
+    """
     with np.errstate(all="ignore"):  # a filter that fails has no number, and says so there
         return run(filter, prior, z, model, z_per_step=True, **options)
 
 
 def distance(found: Gaussian, wanted: Gaussian) -> float:
-    """Largest difference of mean and covariance, in the deviations that are wanted."""
+    """Largest difference of mean and covariance, in the deviations that are wanted.
+
+    Parameters
+    ----------
+    found, wanted : Gaussian
+        mean (..., n), cov (..., n, n).
+
+    Returns
+    -------
+    float
+        NaN where what was found is not finite.
+    """
     deviation = np.sqrt(np.diagonal(wanted.cov, axis1=-2, axis2=-1))
     deviation = np.where(deviation > 0, deviation, 1.0)
     of_mean = np.abs(found.mean - wanted.mean) / deviation

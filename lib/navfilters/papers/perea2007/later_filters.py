@@ -87,7 +87,19 @@ class Runs(NamedTuple):
 
 
 def experiment(setup: Setup, runs: int, steps: int, seed: int = 0) -> Experiment:
-    """Starts drawn as the filters believe them to be, and measurements with the noise of R."""
+    """Starts drawn as the filters believe them to be, and measurements with the noise of R.
+
+    Parameters
+    ----------
+    setup : Setup
+    runs, steps : int
+    seed : int
+
+    Returns
+    -------
+    Experiment
+        Starts (runs, 2), measurements (steps, runs, 2).
+    """
     rng = np.random.default_rng(seed)
     noise = rng.standard_normal((steps, runs, 2)) * np.sqrt(np.diagonal(setup.model.R))
     start = setup.x_true + setup.sigma * rng.standard_normal((runs, 2))
@@ -133,7 +145,19 @@ def follow(
 
 
 def judged(setup: Setup, mean: Array, cov: Array) -> Runs:
-    """Estimates (..., runs, 2) beside the truth."""
+    """Estimates beside the truth.
+
+    Parameters
+    ----------
+    setup : Setup
+    mean : array (..., runs, 2)
+    cov : array (..., runs, 2, 2)
+
+    Returns
+    -------
+    Runs
+        Distances in units, infinite where there is no number, and NEES, (..., runs).
+    """
     error = np.array(setup.x_true) - mean
     distance = np.linalg.norm(error, axis=-1)
     return Runs(np.where(np.isfinite(distance), distance, np.inf), nees(error, cov))

@@ -106,7 +106,18 @@ class Rival(NamedTuple):
 
 
 def imm(stay: Array, back: Array) -> InteractingModels:
-    """Two EKFs: probability that a silent engine stays silent, and that one that runs goes on."""
+    """Two EKFs, one for a silent engine and one for an engine that runs.
+
+    Parameters
+    ----------
+    stay, back : float or array (...)
+        Probability that a silent engine stays silent, and that a running one goes on, from one
+        update to the next.
+
+    Returns
+    -------
+    InteractingModels
+    """
     stay, back = np.broadcast_arrays(stay, back)
     rows = [[stay, 1 - stay], [1 - back, back]]
     switching = np.moveaxis(np.array(rows), (0, 1), (-2, -1))
