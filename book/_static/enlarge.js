@@ -15,6 +15,7 @@
         const large = new Image();
         large.src = image.currentSrc || image.src;
         large.alt = image.alt;
+        dialog.classList.toggle("lines", !image.classList.contains("picture"));
         dialog.replaceChildren(large);
         dialog.showModal();
       };

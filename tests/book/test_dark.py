@@ -1,0 +1,63 @@
+"""Figures in the dark: lines are drawn light on dark, pictures keep their colours."""
+
+import base64
+import io
+import re
+
+import browser as chromium
+import nbformat
+import numpy as np
+import pytest
+from matplotlib import image
+
+INK = re.compile(r"\b(black|white|dark|pale)\b(?! noise)", re.I)
+
+
+def figures():
+    """Cell, settings of its figure, and pixels of every captioned figure that is stored."""
+    for path in sorted((chromium.ROOT / "book").rglob("*.ipynb")):
+        for cell in nbformat.read(path, as_version=4).cells:
+            settings = cell.metadata.get("mystnb", {})
+            pngs = [o["data"]["image/png"] for o in cell.get("outputs", ()) if _drawn(o)]
+            if "figure" in settings and pngs:
+                yield settings, image.imread(io.BytesIO(base64.b64decode(pngs[0])))[..., :3]
+
+
+def _drawn(output):
+    return "image/png" in output.get("data", {})
+
+
+FIGURES = list(figures())
+NAMES = [settings["figure"]["name"] for settings, _ in FIGURES]
+
+
+@pytest.mark.parametrize(("settings", "pixels"), FIGURES, ids=NAMES)
+def test_pictures_and_named_inks_are_marked(settings, pixels):
+    """A map inverted would lie; a line that a caption calls black needs a word in the dark."""
+    marked = settings.get("image", {}).get("classes", "")
+    coloured = np.mean(np.ptp(pixels, axis=-1) > 0.16)
+    paper = np.mean(pixels.min(axis=-1) > 0.98)
+    if coloured > 0.3 or paper < 0.45:
+        assert marked == "picture"
+    elif INK.search(settings["figure"]["caption"]):
+        assert marked in ("ink", "picture")
+
+
+@pytest.fixture
+def brightness(browser):
+    """Mean brightness, 0 to 255, of a figure as it stands on its page in the dark."""
+
+    def of(page, name):
+        with browser.visit(page, theme="dark") as visit:
+            shot = visit.page.locator(f"#{name} img").screenshot()
+        return 255 * image.imread(io.BytesIO(shot))[..., :3].mean()
+
+    return of
+
+
+def test_lines_are_dark(brightness):
+    assert brightness("book/range-bearing/ekf-divergence", "fig-perea-2a") < 60
+
+
+def test_pictures_are_not_inverted(brightness):
+    assert brightness("book/sar-navigation/sar-imaging", "fig-sar-scene") > 100
