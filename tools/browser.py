@@ -131,7 +131,7 @@ class Site:
 def site(folder: Path) -> Iterator[Site]:
     """Serve a folder of pages on this machine alone, with a browser to look at them."""
     with _serve(folder) as address, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=find(), args=ARGS)
+        browser = playwright.chromium.launch(executable_path=find(), args=ARGS, ignore_default_args=['--hide-scrollbars'])
         try:
             yield Site(browser, address)
         finally:
