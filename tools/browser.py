@@ -24,6 +24,7 @@ ARGS = [
     "--disable-component-update",
     "--disable-sync",
 ]
+BARS = ["--hide-scrollbars"]  # what Playwright asks for, and tests of what scrolls must not
 # The theme's own storage keys. Without them it follows the system, as on a first visit.
 REMEMBER = "localStorage.setItem('mode', '{0}'); localStorage.setItem('theme', '{0}')"
 STILL = "*, ::before, ::after { transition: none !important; animation: none !important }"
@@ -131,7 +132,9 @@ class Site:
 def site(folder: Path) -> Iterator[Site]:
     """Serve a folder of pages on this machine alone, with a browser to look at them."""
     with _serve(folder) as address, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=find(), args=ARGS)
+        browser = playwright.chromium.launch(
+            executable_path=find(), args=ARGS, ignore_default_args=BARS
+        )
         try:
             yield Site(browser, address)
         finally:

@@ -47,7 +47,7 @@ def _like(value: Any, recorded: Any) -> Any:
 
 
 def run(path: Path, seed: int | None) -> dict[str, Any]:
-    """Values of claims by id, and the printed text of each cell by its id."""
+    """Values of claims by id, and by its cell's id the text that each prints or shows."""
     shell = InteractiveShell.instance(colors="NoColor")
     shell.user_ns["__name__"] = "__main__"
     notes: dict[str, Any] = {}
