@@ -27,8 +27,9 @@ def test_one_cell_comes_first_and_the_rest_stays(url):
 
 
 def test_twice_is_once():
-    once = downloads.by_itself(notebook(), "")
-    assert downloads.by_itself(once, URL) == downloads.by_itself(notebook(), URL)
+    given = notebook()
+    again = downloads.by_itself(downloads.by_itself(given, ""), URL)
+    assert again == downloads.by_itself(given, URL)
 
 
 def test_every_notebook_of_a_site(tmp_path, capsys):
