@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 BUILT := _build/.complete
 BENCH := .venv-bench
 SOURCES := $(shell find book lib -type f -not -path '*/__pycache__/*' -not -name '.*' -not -path '*/thumbnails/*' 2>/dev/null) \
-	_config.yml _toc.yml requirements.txt tools/execute_notebooks.py tools/executed.py tools/thumbnails.py
+	_config.yml _toc.yml requirements.txt tools/execute_notebooks.py tools/executed.py tools/thumbnails.py tools/downloads.py
 
 # Everything runs in .venv, with .venv's settings: what the shell has of packages (ROS sets PYTHONPATH),
 # start-up files, kernels named python3, styles and pip options stays outside.
@@ -37,7 +37,7 @@ test -z "$(2)" && $(1)/bin/python -c '$(WHOLE)' >/dev/null 2>&1 || $(PYTHON) -m 
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help book test unit coverage lint notebooks nbval elsewhere spread pages screens pdf bench campaign lock clean
+.PHONY: help book test unit coverage lint notebooks nbval elsewhere spread pages screens pdf dist serve bench campaign lock clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1  /p' $(MAKEFILE_LIST) | awk '{printf "  make %-10s", $$1; $$1 = ""; print}'
@@ -50,6 +50,7 @@ $(BUILT): $(SOURCES) $(VENV)/.book
 	$(BIN)/python tools/execute_notebooks.py
 	$(BIN)/python tools/thumbnails.py
 	$(BIN)/jupyter-book build . --warningiserror --nitpick --keep-going
+	$(BIN)/python tools/downloads.py _build/html
 	@touch $@
 
 test: lint coverage nbval elsewhere pages  ## everything: lint, types, unit tests, notebooks, rendered pages
@@ -88,6 +89,14 @@ screens: $(VENV)/.test $(BUILT)  ## every page as a picture: wide and 390 px, li
 
 pdf: $(VENV)/.test $(BUILT)  ## the whole book as _build/book.pdf, printed by Chromium
 	$(BIN)/python tools/pdf.py _build/html _build/book.pdf
+
+dist: $(VENV)/.book  ## wheel and sdist in _build/dist, checked and installed into empty environments
+	test -x _build/dist-tools/bin/twine || $(PYTHON) -m venv --clear _build/dist-tools
+	_build/dist-tools/bin/python -m pip install --quiet --disable-pip-version-check uv twine
+	$(BIN)/python tools/check_package.py _build/dist-tools/bin
+
+serve: $(VENV)/.book  ## the book at http://localhost:8000, built again when a page changes
+	$(BIN)/python tools/serve.py
 
 bench: $(BENCH)/.ready $(VENV)/.book  ## measure beside the peers and a C loop; store the results in benchmarks/
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/run.py

@@ -10,8 +10,15 @@ from polar_models import engines
 from ruled import Matched
 
 from navfilters import FILTERS, Filter, Gaussian, run, sweep, unscented
-from navfilters.estimators import AdaptiveRobust, considering
-from navfilters.estimators.variants import Underweighting, bump_linear
+from navfilters.estimators import (
+    AdaptiveRobust,
+    considering,
+    iterated,
+    once,
+    recalibrated,
+    recursive,
+)
+from navfilters.estimators.variants import Underweighting, bump_linear, bump_state
 from navfilters.models import Augmented, Linear, RangeBearing
 
 EKF = FILTERS["EKF"]
@@ -51,6 +58,37 @@ def test_every_step_is_the_printed_one():
         for k, (x, P) in enumerate(steps, 1):
             assert_allclose(got.mean[k, i], x, rtol=1e-10, atol=1e-13)
             assert_allclose(got.cov[k, i], P, rtol=1e-10, atol=1e-13)
+
+
+@pytest.mark.parametrize("correction", [once, iterated, recalibrated])
+@pytest.mark.parametrize(
+    "stages",
+    [
+        {},
+        {"moments": unscented},
+        {"variant": partial(bump_linear, bump=0.7)},
+        {"variant": Underweighting(0.7, 1)},
+        {"variant": bump_state},
+        {"rule": AdaptiveRobust()},
+    ],
+)
+def test_it_says_what_it_is_on_a_linear_model(stages, correction):
+    prior, z, model, _ = problem()
+    filter_ = considering(Filter(**stages, correction=correction), [0, 2])
+    wanted = filter_.linear_limit(prior, z[0], model)
+    got = filter_.update(filter_.init(prior), z[0], model).estimate
+    assert_allclose(got.mean, wanted.mean, rtol=1e-7, atol=1e-10)
+    assert_allclose(got.cov, wanted.cov, rtol=1e-7, atol=1e-10)
+
+
+def test_its_limit_is_the_printed_partition():
+    prior, z, model, _ = problem()
+    still = Matched(np.eye(3), np.eye(3), np.zeros((3, 3)))
+    got = considering(EKF, [2]).linear_limit(prior, z[0], model)
+    for i in range(4):
+        ((x, P),) = printed(prior.mean[i], prior.cov[i], z[:1, i], model, still)
+        assert_allclose(got.mean[i], x, rtol=1e-10, atol=1e-13)
+        assert_allclose(got.cov[i], P, rtol=1e-10, atol=1e-13)
 
 
 def test_its_covariance_is_that_of_the_linear_estimator_that_it_is():
@@ -145,6 +183,11 @@ def test_all_considered_leaves_the_state():
             lambda: considering(Filter(form="short"), [1]),
             ValueError,
             "form 'joseph'; found 'short'",
+        ),
+        (
+            lambda: considering(Filter(correction=partial(recursive, updates=3)), [1]),
+            ValueError,
+            "gain from P_xz; recursive updates do not",
         ),
         (lambda: considering(EKF, []), ValueError, "states must be at least one number"),
         (lambda: considering(EKF, [-1]), ValueError, "states must be an integer of at least 0"),

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from navfilters.estimators import model_parts
+from navfilters.estimators.correction import recursive
 from navfilters.estimators.filter import Filter
 from navfilters.estimators.rule import sensed
 from navfilters.estimators.variants import Variant
@@ -35,6 +36,12 @@ class Consider:
         rows = np.isin(np.arange(n), list(self.states))[:, None]
         return prior, moments._replace(P_xz=xp.where(rows, 0.0, moments.P_xz), H=H, R=R)
 
+    def limit(self, prior: Gaussian, updated: Gaussian) -> Gaussian:
+        """A Kalman filter's update, in which the considered states are as they were."""
+        own = np.isin(np.arange(prior.cov.shape[-1]), list(self.states))
+        mean = np.where(own, prior.mean, updated.mean)
+        return Gaussian(mean, np.where(own[:, None] & own, prior.cov, updated.cov))
+
 
 def considering(estimator: Filter, states: Sequence[int]) -> Filter:
     """The same filter, which leaves some states as they are and weighs their uncertainty.
@@ -59,8 +66,9 @@ def considering(estimator: Filter, states: Sequence[int]) -> Filter:
     TypeError
         An estimator that is no Filter.
     ValueError
-        The short form, whose covariance holds for the optimal gain alone; no states, or what is no
-        number of one; from an update, a number that the state does not have.
+        The short form, whose covariance holds for the optimal gain alone; recursive updates, which
+        make gains of their own; no states, or what is no number of one; from an update, a number
+        that the state does not have.
 
     References
     ----------
@@ -70,6 +78,8 @@ def considering(estimator: Filter, states: Sequence[int]) -> Filter:
         raise TypeError(f"estimator must be a Filter; found {type(estimator).__name__}")
     if estimator.form != "joseph":
         raise ValueError(f"estimator must have form 'joseph'; found {estimator.form!r}")
+    if getattr(estimator.correction, "func", estimator.correction) is recursive:
+        raise ValueError("estimator must take its gain from P_xz; recursive updates do not")
     numbers = frozenset(validation.whole_number("states", i, 0) for i in states)
     if not numbers:
         raise ValueError("states must be at least one number; found none")

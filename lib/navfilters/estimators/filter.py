@@ -10,11 +10,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from navfilters.estimators import model_parts
 from navfilters.estimators.correction import Correction, Observation, once
-from navfilters.estimators.limits import LIMITS
+from navfilters.estimators.limits import textbook
 from navfilters.estimators.moments import linearized
 from navfilters.estimators.options import accepted, keywords
 from navfilters.estimators.prediction import PREDICTIONS, in_parts, predict_linearized
@@ -291,9 +289,4 @@ class Filter:
         H, R = model.jacobian(prior.mean), model_parts.noise(model, prior.mean)
         P = prior.cov if self.rule is None else self.rule.limit(prior.cov)
         variant = model_parts.at(self.variant, 0)
-        given = getattr(variant, "keywords", {}) | accepted(variant, options)
-        P, R = LIMITS[getattr(variant, "func", variant)](P, H, R, **given)
-        weight = H.mT @ np.linalg.inv(R)
-        cov = np.linalg.inv(np.linalg.inv(P) + weight @ H)
-        residual = z - (H @ prior.mean[..., None])[..., 0]
-        return Gaussian(prior.mean + (cov @ weight @ residual[..., None])[..., 0], cov)
+        return textbook(variant, accepted(variant, options), Gaussian(prior.mean, P), z, H, R)

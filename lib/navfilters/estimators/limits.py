@@ -1,9 +1,11 @@
 """What each variant is on a linear model, in the textbook's terms: its P and R given (P, H, R)."""
 
+from typing import Any
+
 import numpy as np
 
 from navfilters.estimators import variants
-from navfilters.types import Array
+from navfilters.types import Array, Gaussian
 
 Limit = tuple[Array, Array]
 
@@ -39,3 +41,29 @@ LIMITS = {
     variants.expect_at_mean: _kalman,
 }
 """Every variant of the library, with its limit: the Kalman filter of this P and R."""
+
+
+def textbook(variant: Any, options: dict, prior: Gaussian, z: Array, H: Array, R: Array):
+    """The Kalman filter that a variant is, by LAPACK: no line of the filters takes part.
+
+    Parameters
+    ----------
+    variant : callable
+        Of the first step. One that is made around another has this as ``variant``, and ``limit``.
+    options : dict
+    prior : Gaussian
+        As the rule left it.
+    z, H, R : array (..., m), (..., m, n), (..., m, m)
+
+    Returns
+    -------
+    Gaussian
+    """
+    inner = getattr(variant, "variant", variant)
+    given = getattr(inner, "keywords", {}) | options
+    P, R = LIMITS[getattr(inner, "func", inner)](prior.cov, H, R, **given)
+    weight = H.mT @ np.linalg.inv(R)
+    cov = np.linalg.inv(np.linalg.inv(P) + weight @ H)
+    residual = z - (H @ prior.mean[..., None])[..., 0]
+    updated = Gaussian(prior.mean + (cov @ weight @ residual[..., None])[..., 0], cov)
+    return updated if inner is variant else variant.limit(Gaussian(prior.mean, P), updated)

@@ -211,7 +211,7 @@ def _fault_of_word(claim: Claim, words: Mapping[str, Word]) -> str:
 
 
 def find(start: Path | None = None) -> Path:
-    """The ledger: book/claims.toml in the working folder or above it.
+    """The ledger: book/claims.toml in the working folder or above it, or that of the wheel.
 
     Parameters
     ----------
@@ -228,8 +228,8 @@ def find(start: Path | None = None) -> Path:
         When there is none.
     """
     start = (start or Path.cwd()).resolve()
-    for folder in (start, *start.parents):
-        path = folder / "book" / "claims.toml"
+    places = [folder / "book" / "claims.toml" for folder in (start, *start.parents)]
+    for path in (*places, Path(__file__).with_name("claims.toml")):
         if path.is_file():
             return path
     raise ClaimError(f"no book/claims.toml in {start} or above it")
