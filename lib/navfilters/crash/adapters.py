@@ -1,5 +1,6 @@
 """Filters of other libraries, one state at a time, in the protocol of this one."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -49,7 +50,9 @@ class Adapted:
         covs = np.broadcast_to(cov, (*batch, n, n)).reshape(-1, n, n)
         seen = np.broadcast_to(z, (*batch, m)).reshape(-1, m)
         moved = None if dynamics is None else model_parts.at(dynamics, k)
-        new = [self._one(*each, sensor, moved) for each in zip(means, covs, seen, strict=True)]
+        with warnings.catch_warnings():  # one per member and step would bury the report
+            warnings.simplefilter("ignore")
+            new = [self._one(*each, sensor, moved) for each in zip(means, covs, seen, strict=True)]
         estimate = Gaussian(
             np.array([x for x, _ in new]).reshape(*batch, n),
             np.array([P for _, P in new]).reshape(*batch, n, n),
@@ -133,8 +136,20 @@ def from_filterpy(kind: Any, **options: Any) -> Adapted:
     raise TypeError(f"kind must be one of filterpy's four; found {kind.__name__}")
 
 
-def _seen(z: Array, model: Any) -> tuple[Array, Array, Any, Any, Any]:
-    """z, R, h, jacobian and residual of the components that were measured."""
+def measured(z: Array, model: Any) -> tuple[Array, Array, Any, Any, Any]:
+    """What of a measurement there is, with the model of that alone.
+
+    Parameters
+    ----------
+    z : array (m,)
+        NaN where it was not measured.
+    model : MeasurementModel
+
+    Returns
+    -------
+    tuple
+        z (k,), R (k, k), h, jacobian and residual of the components that were measured.
+    """
     kept = ~np.isnan(z)
     R = model.R[np.ix_(kept, kept)]
 
@@ -166,7 +181,7 @@ def _linear_prediction(kind: Any) -> Prediction:
 
 def _extended(kind: Any) -> Correction:
     def update(x: Array, P: Array, z: Array, model: Any) -> tuple[Array, Array]:
-        z, R, h, jacobian, residual = _seen(z, model)
+        z, R, h, jacobian, residual = measured(z, model)
         theirs = kind(dim_x=len(x), dim_z=len(z))
         theirs.x, theirs.P, theirs.R = x, P, R
         theirs.update(z, jacobian, h, residual=residual)
@@ -177,7 +192,7 @@ def _extended(kind: Any) -> Correction:
 
 def _linear(kind: Any) -> Correction:
     def update(x: Array, P: Array, z: Array, model: Any) -> tuple[Array, Array]:
-        z, R, h, jacobian, residual = _seen(z, model)
+        z, R, h, jacobian, residual = measured(z, model)
         theirs = kind(dim_x=len(x), dim_z=len(z))
         theirs.x, theirs.P, theirs.R, theirs.H = x, P, R, jacobian(x)
         theirs.update(theirs.H @ x + residual(z, h(x)))
@@ -198,7 +213,7 @@ def _sampled(make: Callable[..., Any]) -> Adapted:
         return np.reshape(theirs.x, -1), theirs.P
 
     def update(x: Array, P: Array, z: Array, model: Any) -> tuple[Array, Array]:
-        z, R, h, _, residual = _seen(z, model)
+        z, R, h, _, residual = measured(z, model)
 
         def mean(sigmas: Array, weights: Array) -> Array:
             away = np.array([residual(s, sigmas[0]) for s in sigmas])  # angles have no plain mean

@@ -1,8 +1,10 @@
 """What a crash test found: in lines, as data, as a page."""
 
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from html import escape
+from typing import Any
 
 from navfilters.crash.check import Case, Check
 from navfilters.problems import own, read
@@ -24,6 +26,8 @@ class Finding:
         Why it was not asked.
     seconds : float
         That it took.
+    kept : mapping
+        What its figure shows, as :class:`~navfilters.crash.subject.Subject` kept it.
     """
 
     check: Check
@@ -31,6 +35,7 @@ class Finding:
     raised: str = ""
     skipped: str = ""
     seconds: float = 0.0
+    kept: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     @property
     def passed(self) -> bool | None:
