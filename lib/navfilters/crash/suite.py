@@ -178,11 +178,9 @@ def crash_test(
     workers = cores() if workers is None else validation.whole_number("workers", workers, 1)
     asked = [c for c in checks if c.vector or not isinstance(filter, Adapted)]
     findings: list[Finding] = []
-    shown = nullcontext(nobody)
     try:
-        if progress:
-            shown = bar(sum(updates(c.name) for c in asked))
-        with shown as told:
+        total = sum(updates(c.name) for c in asked) if progress else 0
+        with bar(total) if progress else nullcontext(nobody) as told:
             for check in checks:
                 findings.append(_examined(Subject(filter, workers, told), check))
     except KeyboardInterrupt:
