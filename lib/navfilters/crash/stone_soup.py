@@ -47,17 +47,19 @@ def from_stonesoup(predictor: Callable[..., Any], updater: Callable[..., Any]) -
         new = predictor(_Transition(dynamics, x, P)).predict(_state(x, P))
         return _numbers(new)
 
-    def update(x: Array, P: Array, z: Array, model: Any) -> tuple[Array, Array]:
+    def update(x: Array, P: Array, z: Array, model: Any) -> tuple[Array, ...]:
         from stonesoup.types.detection import Detection
         from stonesoup.types.hypothesis import SingleHypothesis
         from stonesoup.types.prediction import GaussianStatePrediction
 
         sensor = _Sensor(model, x, z)
         seen = Detection(sensor.z[:, None], measurement_model=sensor)
-        before = GaussianStatePrediction(x[:, None], P)
-        return _numbers(updater(sensor).update(SingleHypothesis(before, seen)))
+        pair = SingleHypothesis(GaussianStatePrediction(x[:, None], P), seen)
+        new = _numbers(updater(sensor).update(pair))
+        expected, S = _numbers(pair.measurement_prediction)
+        return *new, sensor.z - expected, S
 
-    return Adapted(predict, update)
+    return Adapted(predict, update, True)
 
 
 def _state(x: Array, P: Array) -> Any:
