@@ -23,7 +23,7 @@ def test_a_textbooks_filter_passes_what_is_asked_of_correct_ones(check):
 
 def test_the_librarys_own_ekf_is_correct_and_diverges():
     report = crash_test(FILTERS["EKF"], "quick", progress=False)
-    assert report.failed == ("fix, perfect", "fix, noisy", "starts")
+    assert report.failed == ("fix, perfect", "fix, noisy", "starts", "sweeps")
 
 
 def test_filterpys_ekf_is_correct_and_diverges_in_the_same_way():

@@ -80,10 +80,10 @@ def test_what_is_not_asked_does_not_fail():
 def test_an_interruption_keeps_what_was_done(monkeypatch):
     real = suites._examined
 
-    def stop(filter, check):
+    def stop(subject, check):
         if check.name == "motion":
             raise KeyboardInterrupt
-        return real(filter, check)
+        return real(subject, check)
 
     monkeypatch.setattr(suites, "_examined", stop)
     report = crash_test(ekf(), ["linear", "motion", "missing"], progress=False)

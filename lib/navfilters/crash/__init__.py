@@ -3,6 +3,7 @@
 from navfilters.crash.adapters import Adapted, from_filterpy, from_functions
 from navfilters.crash.check import Case, Check
 from navfilters.crash.report import Finding, Report
+from navfilters.crash.stone_soup import from_stonesoup
 from navfilters.crash.suite import CHECKS, SUITES, crash_test
 
 __all__ = [
@@ -16,4 +17,5 @@ __all__ = [
     "crash_test",
     "from_filterpy",
     "from_functions",
+    "from_stonesoup",
 ]

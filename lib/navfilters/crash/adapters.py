@@ -1,5 +1,6 @@
 """Filters of other libraries, one state at a time, in the protocol of this one."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +14,7 @@ from navfilters.numerics.extras import needed
 from navfilters.types import Array, Gaussian
 
 Prediction = Callable[[Array, Array, Any], tuple[Array, Array]]
-Correction = Callable[[Array, Array, Array, Any], tuple[Array, Array]]
+Correction = Callable[[Array, Array, Array, Any], tuple[Array, ...]]
 
 
 @dataclass(frozen=True)
@@ -28,10 +29,14 @@ class Adapted:
     update : callable
         (mean, cov, z (m,), model) -> (mean, cov). ``model`` has h(x) and R (m, m), and may have
         jacobian(x) and residual(z, z_hat). Entries of z that were not measured are NaN.
+    innovations : bool
+        Whether ``update`` also returns innovation (k,) and S (k, k) of the k components that were
+        measured: (mean, cov, innovation, S).
     """
 
     predict: Prediction
     update: Correction
+    innovations: bool = False
 
     def init(self, prior: Gaussian) -> FilterState:
         """The state before any step."""
@@ -49,29 +54,39 @@ class Adapted:
         covs = np.broadcast_to(cov, (*batch, n, n)).reshape(-1, n, n)
         seen = np.broadcast_to(z, (*batch, m)).reshape(-1, m)
         moved = None if dynamics is None else model_parts.at(dynamics, k)
-        new = [self._one(*each, sensor, moved) for each in zip(means, covs, seen, strict=True)]
-        estimate = Gaussian(
-            np.array([x for x, _ in new]).reshape(*batch, n),
-            np.array([P for _, P in new]).reshape(*batch, n, n),
+        with warnings.catch_warnings():  # one per member and step would bury the report
+            warnings.simplefilter("ignore")
+            new = [self._one(*each, sensor, moved) for each in zip(means, covs, seen, strict=True)]
+        mean, cov, y, S = (
+            np.array(parts).reshape(*batch, *parts[0].shape) for parts in zip(*new, strict=True)
         )
-        return FilterState(estimate, missed(state, absent(z)))
+        told = (y, S) if self.innovations else (None, None)
+        return FilterState(Gaussian(mean, cov), missed(state, absent(z)), None, *told)
 
-    def _one(self, x: Array, P: Array, z: Array, sensor: Any, dynamics: Any) -> Any:
-        x, P = x.copy(), P.copy()
+    def _one(self, x: Array, P: Array, z: Array, sensor: Any, dynamics: Any) -> tuple[Array, ...]:
+        """Mean, covariance, innovation and S of a member, the last two NaN where not measured."""
+        x, P, kept = x.copy(), P.copy(), np.flatnonzero(~np.isnan(z))
+        y, S = np.full(z.shape, np.nan), np.full(z.shape * 2, np.nan)
         if dynamics is not None:
             x, P = self.predict(x, P, dynamics)
-        if not np.isnan(z).all():
-            x, P = self.update(x, P, z, sensor)
-        return np.asarray(x, float).reshape(-1), np.asarray(P, float)
+        if kept.size:
+            x, P, *told = self.update(x, P, z, sensor)
+            if self.innovations:
+                y[kept], S[np.ix_(kept, kept)] = np.reshape(told[0], -1), told[1]
+        return np.asarray(x, float).reshape(-1), np.asarray(P, float), y, S
 
 
-def from_functions(predict: Prediction, update: Correction) -> Adapted:
+def from_functions(
+    predict: Prediction, update: Correction, *, innovations: bool = False
+) -> Adapted:
     """A filter that is two functions of one state.
 
     Parameters
     ----------
     predict, update : callable
         As of :class:`Adapted`.
+    innovations : bool
+        Whether ``update`` returns its innovations, too, for a picture of the NIS.
 
     Returns
     -------
@@ -85,7 +100,7 @@ def from_functions(predict: Prediction, update: Correction) -> Adapted:
     for name, function in (("predict", predict), ("update", update)):
         if not callable(function):
             raise TypeError(f"{name} must be a function; found {function!r}")
-    return Adapted(predict, update)
+    return Adapted(predict, update, innovations)
 
 
 def from_filterpy(kind: Any, **options: Any) -> Adapted:
@@ -122,9 +137,9 @@ def from_filterpy(kind: Any, **options: Any) -> Adapted:
     if unknown:
         raise TypeError(f"unknown options {sorted(unknown)}; from_filterpy has points")
     if issubclass(kind, kalman.ExtendedKalmanFilter):
-        return Adapted(_linear_prediction(kind), _extended(kind))
+        return Adapted(_linear_prediction(kind), _extended(kind), True)
     if issubclass(kind, kalman.KalmanFilter):
-        return Adapted(_linear_prediction(kind), _linear(kind))
+        return Adapted(_linear_prediction(kind), _linear(kind), True)
     if issubclass(kind, kalman.UnscentedKalmanFilter):
         points = options.get("points", lambda n: kalman.MerweScaledSigmaPoints(n, 1.0, 2.0, 3 - n))
         return _sampled(lambda n, m, **calls: kind(n, m, 1.0, points=points(n), **calls))
@@ -133,8 +148,20 @@ def from_filterpy(kind: Any, **options: Any) -> Adapted:
     raise TypeError(f"kind must be one of filterpy's four; found {kind.__name__}")
 
 
-def _seen(z: Array, model: Any) -> tuple[Array, Array, Any, Any, Any]:
-    """z, R, h, jacobian and residual of the components that were measured."""
+def measured(z: Array, model: Any) -> tuple[Array, Array, Any, Any, Any]:
+    """What of a measurement there is, with the model of that alone.
+
+    Parameters
+    ----------
+    z : array (m,)
+        NaN where it was not measured.
+    model : MeasurementModel
+
+    Returns
+    -------
+    tuple
+        z (k,), R (k, k), h, jacobian and residual of the components that were measured.
+    """
     kept = ~np.isnan(z)
     R = model.R[np.ix_(kept, kept)]
 
@@ -165,23 +192,23 @@ def _linear_prediction(kind: Any) -> Prediction:
 
 
 def _extended(kind: Any) -> Correction:
-    def update(x: Array, P: Array, z: Array, model: Any) -> tuple[Array, Array]:
-        z, R, h, jacobian, residual = _seen(z, model)
+    def update(x: Array, P: Array, z: Array, model: Any) -> tuple[Array, ...]:
+        z, R, h, jacobian, residual = measured(z, model)
         theirs = kind(dim_x=len(x), dim_z=len(z))
         theirs.x, theirs.P, theirs.R = x, P, R
         theirs.update(z, jacobian, h, residual=residual)
-        return theirs.x, theirs.P
+        return theirs.x, theirs.P, theirs.y, theirs.S
 
     return update
 
 
 def _linear(kind: Any) -> Correction:
-    def update(x: Array, P: Array, z: Array, model: Any) -> tuple[Array, Array]:
-        z, R, h, jacobian, residual = _seen(z, model)
+    def update(x: Array, P: Array, z: Array, model: Any) -> tuple[Array, ...]:
+        z, R, h, jacobian, residual = measured(z, model)
         theirs = kind(dim_x=len(x), dim_z=len(z))
         theirs.x, theirs.P, theirs.R, theirs.H = x, P, R, jacobian(x)
         theirs.update(theirs.H @ x + residual(z, h(x)))
-        return theirs.x, theirs.P
+        return theirs.x, theirs.P, theirs.y, theirs.S
 
     return update
 
@@ -197,8 +224,8 @@ def _sampled(make: Callable[..., Any]) -> Adapted:
         theirs.predict()
         return np.reshape(theirs.x, -1), theirs.P
 
-    def update(x: Array, P: Array, z: Array, model: Any) -> tuple[Array, Array]:
-        z, R, h, _, residual = _seen(z, model)
+    def update(x: Array, P: Array, z: Array, model: Any) -> tuple[Array, ...]:
+        z, R, h, _, residual = measured(z, model)
 
         def mean(sigmas: Array, weights: Array) -> Array:
             away = np.array([residual(s, sigmas[0]) for s in sigmas])  # angles have no plain mean
@@ -208,9 +235,9 @@ def _sampled(make: Callable[..., Any]) -> Adapted:
         theirs.x, theirs.P, theirs.Q, theirs.R = x, P, np.zeros_like(P), R
         theirs.predict()  # draws the points again; nothing moves
         theirs.update(z)
-        return np.reshape(theirs.x, -1), theirs.P
+        return np.reshape(theirs.x, -1), theirs.P, theirs.y, theirs.S
 
-    return Adapted(predict, update)
+    return Adapted(predict, update, True)
 
 
 def _cubature(kind: Any, n: int, m: int, hx: Any, fx: Any, calls: dict) -> Any:
@@ -235,6 +262,7 @@ class _Columns:
     def update(self, z: Array) -> None:
         self.theirs.R = self.R
         self.theirs.update(z.reshape(-1, 1))
+        self.y, self.S = self.theirs.y, self.theirs.S
         self._take()
 
     def _take(self) -> None:

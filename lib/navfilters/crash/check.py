@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from navfilters.runs.loop import run
+from navfilters.crash.subject import Subject
 from navfilters.types import Gaussian
 
 
@@ -55,7 +55,7 @@ class Check:
     chapter : str
         Where the book explains it, relative to book/.
     cases : callable
-        filter -> iterator of Case.
+        subject -> iterator of Case.
     vector : bool
         Whether the state is a vector; a filter of one state at a time is not asked otherwise.
     """
@@ -63,7 +63,7 @@ class Check:
     name: str
     rule: str
     chapter: str
-    cases: Callable[[Any], Iterator[Case]]
+    cases: Callable[[Subject], Iterator[Case]]
     vector: bool = True
 
     def __call__(self, filter: Any) -> list[Case]:
@@ -71,35 +71,13 @@ class Check:
 
         Parameters
         ----------
-        filter : what ``run`` takes
+        filter : Subject, or what ``run`` takes
 
         Returns
         -------
         list of Case
         """
-        return list(self.cases(filter))
-
-
-def history(filter: Any, prior: Gaussian, z: Any, model: Any, **options: Any) -> Gaussian:
-    """The estimates of a run, without warnings of a filter that fails.
-
-    Parameters
-    ----------
-    filter : what ``run`` takes
-    prior : Gaussian
-        mean (..., n), cov (..., n, n).
-    z : array (steps, ..., m)
-    model : MeasurementModel
-    **options
-        Of ``run``.
-
-    Returns
-    -------
-    Gaussian
-        mean (steps + 1, ..., n), the prior first.
-    """
-    with np.errstate(all="ignore"):  # a filter that fails has no number, and says so there
-        return run(filter, prior, z, model, z_per_step=True, **options)
+        return list(self.cases(filter if isinstance(filter, Subject) else Subject(filter)))
 
 
 def distance(found: Gaussian, wanted: Gaussian) -> float:

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from navfilters.crash.check import Case, distance, history
+from navfilters.crash.check import Case, distance
+from navfilters.crash.subject import Subject
 from navfilters.models import Linear
 from navfilters.types import Array, Gaussian
 
@@ -86,43 +87,43 @@ def _informed(x: Array, P: Array, z: Array, H: Array, R: Array, motion: Motion |
     return x + new @ weight @ (z[kept] - H[kept] @ x), new
 
 
-def linear_updates(filter: Any) -> Iterator[Case]:
+def linear_updates(subject: Subject) -> Iterator[Case]:
     """Several updates of states that stand still."""
-    yield from _compared(filter, moving=False)
+    yield from _compared(subject, moving=False)
 
 
-def linear_motion(filter: Any) -> Iterator[Case]:
+def linear_motion(subject: Subject) -> Iterator[Case]:
     """Prediction and update in turn."""
-    yield from _compared(filter, moving=True)
+    yield from _compared(subject, moving=True)
 
 
-def _compared(filter: Any, moving: bool) -> Iterator[Case]:
+def _compared(subject: Subject, moving: bool) -> Iterator[Case]:
     for n, m in SIZES:
         prior, z, model, motion = _problem(n, m, 1)
         dynamics = motion if moving else None
-        found = history(filter, prior, z, model, dynamics=dynamics)
+        found = subject.history(prior, z, model, dynamics=dynamics)
         wanted = kalman(prior, z, model.H, model.R, dynamics)
         yield Case(f"{n} states, {m} measured", "deviations off", distance(found, wanted), ROUNDING)
 
 
-def not_measured(filter: Any) -> Iterator[Case]:
+def not_measured(subject: Subject) -> Iterator[Case]:
     """Components, and whole measurements, that are NaN."""
     prior, z, model, motion = _problem(3, 2, 2)
     for name, rows in (("one component", (1, 0, 1)), ("everything", (2, slice(None)))):
         gone = z.copy()
         gone[rows] = np.nan
-        found = history(filter, prior, gone, model, dynamics=motion)
+        found = subject.history(prior, gone, model, dynamics=motion)
         wanted = kalman(prior, gone, model.H, model.R, motion)
         yield Case(f"{name} missing once", "deviations off", distance(found, wanted), ROUNDING)
 
 
-def known_exactly(filter: Any) -> Iterator[Case]:
+def known_exactly(subject: Subject) -> Iterator[Case]:
     """A state of which a component has no variance keeps it, and learns the others."""
     P = np.diag([4.0, 0.0, 1.0])
     prior = Gaussian(np.array([[1.0, 2.0, 3.0]]), P[None])
     H = np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 1.0]])
     z = np.array([[[5.0, 4.0]]])
-    found = history(filter, prior, z, Linear(H, np.eye(2)))
+    found = subject.history(prior, z, Linear(H, np.eye(2)))
     S = H @ P @ H.T + np.eye(2)
     K = np.linalg.solve(S, H @ P).T
     mean = prior.mean + (K @ (z[0, 0] - H @ prior.mean[0]))[None]
@@ -131,13 +132,13 @@ def known_exactly(filter: Any) -> Iterator[Case]:
     yield Case("the second of three states is exact", "deviations off", off, ROUNDING)
 
 
-def ten_decades(filter: Any) -> Iterator[Case]:
+def ten_decades(subject: Subject) -> Iterator[Case]:
     """A prior of 1e5 beside a sensor of 1e-5, nearly the same twice: definite, and right."""
     H = np.array([[1.0, 1.0], [1.0, 1.001]])
     R, P = 1e-10 * np.eye(2), 1e10 * np.eye(2)
     prior = Gaussian(np.zeros((1, 2)), P[None])
     x = np.array([1.0, -2.0])
-    found = history(filter, prior, (H @ x)[None, None], Linear(H, R))
+    found = subject.history(prior, (H @ x)[None, None], Linear(H, R))
     info = np.linalg.inv(P) + H.T @ np.linalg.inv(R) @ H
     wanted = np.linalg.inv(info)
     cov, deviation = found.cov[-1, 0], np.sqrt(np.diag(wanted))

@@ -1,11 +1,13 @@
 """What a crash test found: in lines, as data, as a page."""
 
 import json
-from dataclasses import dataclass
-from html import escape
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 from navfilters.crash.check import Case, Check
-from navfilters.problems import own, read
+from navfilters.crash.comparison import beside
+from navfilters.crash.page import page
 
 SITE = "the chapter {} of When Kalman Filters Diverge"
 
@@ -24,6 +26,8 @@ class Finding:
         Why it was not asked.
     seconds : float
         That it took.
+    kept : mapping
+        What its figure shows, as :class:`~navfilters.crash.subject.Subject` kept it.
     """
 
     check: Check
@@ -31,6 +35,7 @@ class Finding:
     raised: str = ""
     skipped: str = ""
     seconds: float = 0.0
+    kept: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     @property
     def passed(self) -> bool | None:
@@ -149,74 +154,4 @@ class Report:
 
     def html(self) -> str:
         """A page of its own, without a line from elsewhere."""
-        rows = []
-        for f in self.findings:
-            word = {True: "pass", False: "fail", None: "not asked"}[f.passed]
-            cases = "".join(_bar(c) for c in f.cases)
-            again = escape("\n".join(self.reproduce(f))) if f.passed is False else ""
-            note = escape(beside(f.check.name))
-            rows.append(
-                f'<section class="{word.split()[0]}"><h2>{escape(f.check.name)} '
-                f"<span>{word}</span></h2><p>{escape(f.check.rule)}. <i>Chapter "
-                f"{escape(f.check.chapter)}.</i></p><p>{escape(f.why)}</p><p>{note}</p>{cases}"
-                f"{f'<pre>{again}</pre>' if again else ''}</section>"
-            )
-        title = f"Crash test of {escape(self.name)}: {self._count()}"
-        return _PAGE.format(title=title, rows="\n".join(rows))
-
-
-def beside(problem: str) -> str:
-    """What the book's filters make of a problem: the plain EKF, and the best that is honest.
-
-    Parameters
-    ----------
-    problem : str
-        Its name; empty is returned for checks that are none.
-
-    Returns
-    -------
-    str
-    """
-    there = {cure: c for (p, cure), c in own(read()).items() if p == problem and not c.reason}
-    if "EKF" not in there:
-        return ""
-    sound = [c for c in there.values() if c.honest <= 0 and c.lost <= 0.05]
-    words = f"of the book's own filters the EKF loses {there['EKF'].lost:.0%}"
-    if sound:
-        best = min(sound, key=lambda c: c.ratio)
-        words += f", and {best.cure} is the best honest one, {best.ratio:.2g} times the bound"
-    return words
-
-
-def _bar(case: Case) -> str:
-    """A case as a bar that ends at its limit."""
-    share = min(case.excess, 2.0) / 2 if case.excess == case.excess else 1.0
-    return (
-        f'<div class="case"><div>{escape(case.configuration)}: {escape(case.what)} '
-        f"<b>{case.value:.3g}</b>, at most {case.limit:.3g}</div>"
-        f'<div class="bar"><div class="{"in" if case.passed else "out"}" '
-        f'style="width:{100 * share:.0f}%"></div><div class="limit"></div></div></div>'
-    )
-
-
-_PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-<title>{title}</title>
-<style>
-:root {{ color-scheme: light dark; }}
-body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 50rem; margin: 2rem auto; }}
-body {{ padding: 0 1rem; }}
-section {{ border-left: 6px solid; padding: 0.2rem 1rem; margin: 1rem 0; }}
-.pass {{ border-color: #1a7f37; }} .fail {{ border-color: #b3261e; border-left-style: double; }}
-.not {{ border-color: #888; }}
-h2 {{ font-size: 1.1rem; margin: 0.3rem 0; }} h2 span {{ font-weight: 400; }}
-p {{ margin: 0.3rem 0; }} pre {{ overflow-x: auto; border: 1px solid #8888; padding: 0.5rem; }}
-.case {{ font-size: 0.9rem; margin: 0.4rem 0; }}
-.bar {{ position: relative; height: 0.6rem; border: 1px solid #888; }}
-.in {{ background: #1a7f37; height: 100%; }} .out {{ background: #b3261e; height: 100%; }}
-.limit {{ position: absolute; left: 50%; top: -3px; bottom: -3px; border-left: 2px solid; }}
-</style></head><body><h1>{title}</h1>
-<p>A bar that passes the line in its middle is beyond its limit.</p>
-{rows}
-</body></html>
-"""
+        return page(f"Crash test of {self.name}: {self._count()}", self)

@@ -1,7 +1,7 @@
 """A filter tried on a problem, and what became of it."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from navfilters.problems.problem import LOST, Problem
 from navfilters.runs.chi_square import chi_square_band
 from navfilters.runs.consistency import nees, nis
 from navfilters.runs.sweeping import sweep
-from navfilters.types import Array
+from navfilters.types import Array, Gaussian
 
 CONFIDENCE = 0.999
 """Of the band in which an honest filter's mean NEES lies: a table has some 300 of them."""
@@ -67,6 +67,22 @@ class Outcome:
         return np.where(self.nees < low, -1, np.where(self.nees <= high, 0, 1))
 
 
+class History(NamedTuple):
+    """What a filter said after every step of its runs.
+
+    Parameters
+    ----------
+    estimate : Gaussian
+        mean (steps + 1, ..., n) and cov (steps + 1, ..., n, n), the prior first.
+    innovation, S : array (steps + 1, ..., m), (steps + 1, ..., m, m), optional
+        NaN at the prior; None of a filter that tells no innovations.
+    """
+
+    estimate: Gaussian
+    innovation: Array | None
+    S: Array | None
+
+
 def treat(
     problem: Problem,
     estimator: Any,
@@ -102,20 +118,73 @@ def treat(
         As of ``sweep``: a filter that does not fit the problem.
     """
     told = problem if believed is None else believed
+    history = follow(told, estimator, runs, seed, settings=settings)
+    return judge(problem, history, runs, seed, believed=believed, settings=settings)
+
+
+def follow(
+    problem: Problem,
+    estimator: Any,
+    runs: int,
+    seed: int = 0,
+    *,
+    settings: int | None = None,
+    **place: Any,
+) -> History:
+    """Run a filter on a problem.
+
+    Parameters
+    ----------
+    problem, estimator, runs, seed, settings
+        As of :func:`treat`.
+    **place
+        ``workers``, ``chunk`` and ``progress`` of ``sweep``; here and silently by default.
+
+    Returns
+    -------
+    History
+    """
+    draw = problem.drawn(runs, seed)
+    kept = sweep(
+        estimator,
+        draw.prior,
+        draw.z if settings is None else draw.z[:, None],
+        problem.model,
+        dynamics=problem.dynamics,
+        z_per_step=True,
+        record=_kept,
+        **{"workers": 1, "progress": False} | place,
+    ).record
+    return History(*kept)
+
+
+def judge(
+    problem: Problem,
+    history: History,
+    runs: int,
+    seed: int = 0,
+    *,
+    believed: Problem | None = None,
+    settings: int | None = None,
+) -> Outcome:
+    """What became of a problem.
+
+    Parameters
+    ----------
+    problem, runs, seed, believed, settings
+        As of :func:`treat`.
+    history : History
+        Of the runs with that seed.
+
+    Returns
+    -------
+    Outcome
+    """
+    told = problem if believed is None else believed
     draw = told.drawn(runs, seed)
     batch = (runs,) if settings is None else (settings, runs)
     front = (slice(None),) if settings is None else (slice(None), None)
-    (mean, cov), innovation, S = sweep(
-        estimator,
-        draw.prior,
-        draw.z[front],
-        told.model,
-        dynamics=told.dynamics,
-        z_per_step=True,
-        record=_kept,
-        workers=1,
-        progress=False,
-    ).record
+    (mean, cov), innovation, S = history
     window = slice(problem.since, None)
     truth, seen = (
         problem.drawn(runs, seed).truth[front],
@@ -125,7 +194,7 @@ def treat(
         error = problem.error(seen[window], truth[window])
         square = np.mean(np.sum(error[..., list(problem.judged)] ** 2, axis=-1), axis=0)
         each = np.sqrt(np.broadcast_to(square, batch))
-        last = _nees(problem, told.error(mean[-1], draw.truth[front][-1]), cov[-1])
+        last = nees_of(problem, told.error(mean[-1], draw.truth[front][-1]), cov[-1])
     each, last = np.where(np.isfinite(each), each, np.inf), np.broadcast_to(last, batch)
     reference = problem.reference(runs, seed)
     dof = cov.shape[-1] if problem.tested is None else len(problem.tested)
@@ -154,8 +223,18 @@ def _mean_nis(innovation: Array | None, S: Array | None) -> Array:
         return np.nanmean(nis(innovation[1:], S[1:]), axis=(0, -1)) / S.shape[-1]
 
 
-def _nees(problem: Problem, error: Array, cov: Array) -> Array:
-    """Of the components that are tested."""
+def nees_of(problem: Problem, error: Array, cov: Array) -> Array:
+    """NEES of the components that a problem tests.
+
+    Parameters
+    ----------
+    problem : Problem
+    error, cov : array (..., n), (..., n, n)
+
+    Returns
+    -------
+    array (...)
+    """
     if problem.tested is None:
         return nees(error, cov)
     kept = np.array(problem.tested)

@@ -65,7 +65,7 @@ def sweep(
     workers: int | None = None,
     chunk: int | None = None,
     checkpoint: Any = None,
-    progress: bool = True,
+    progress: bool | Callable[[int], Any] = True,
     **old: Any,
 ) -> Sweep:
     """Run a filter over many configurations and keep what is asked for.
@@ -104,8 +104,9 @@ def sweep(
     checkpoint : path, optional
         A folder for finished chunks: the same call again computes only those that are missing. The
         source of the filters is not compared: use another folder when it changes.
-    progress : bool
-        A bar with rate and time left, where standard error is a terminal and tqdm is installed.
+    progress : bool or callable
+        A bar with rate and time left, where standard error is a terminal and tqdm is installed; or
+        who is told of every chunk how many configurations it has finished.
 
     Returns
     -------
@@ -222,16 +223,23 @@ def _numbered(job: Job, chunk: Chunk) -> tuple[int, Kept]:
 
 
 class _NoBar:
-    """In the place of tqdm's bar where that is not installed."""
+    """In the place of tqdm's bar where that is not installed, or another is told."""
+
+    def __init__(self, told: Callable[[int], Any] | None = None) -> None:
+        self.told = told
 
     def update(self, members: int) -> None:
-        """Nothing to show."""
+        """Pass it on."""
+        if self.told is not None:
+            self.told(members)
 
     def unpause(self) -> None:
         """Nothing to time."""
 
 
-def _bar(total: int, progress: bool) -> Any:
+def _bar(total: int, progress: bool | Callable[[int], Any]) -> Any:
+    if callable(progress):
+        return nullcontext(_NoBar(progress))
     try:
         from tqdm import tqdm
     except ImportError:
