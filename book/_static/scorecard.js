@@ -10,6 +10,8 @@
     const claims = JSON.parse(data.textContent);
     const rows = new Map(claims.map((c) => [c.id, document.getElementById(`row-${c.id}`)]));
     const homes = new Map([...rows.values()].filter(Boolean).map((row) => [row, row.parentElement]));
+    const folds = [...document.querySelectorAll("details.claims-work")];
+    let all = false; // the whole of every table; otherwise a table is folded until something is looked for
     const state = { search: "", order: "", paper: "", verdict: "", kind: "", limit: "" };
     const make = (name, attributes, ...children) => {
       const node = Object.assign(document.createElement(name), attributes);
@@ -40,7 +42,7 @@
     const quoted = (v) => `"${String(v).replace(/"/g, '""')}"`;
     const csv = () => [Object.keys(claims[0]), ...chosen().map((c) => Object.values(c))].map((line) => line.map(quoted).join(",")).join("\r\n") + "\r\n";
     nodes.push(save(csv, "text/csv", "claims.csv"), save(() => JSON.stringify(chosen(), null, 1), "application/json", "claims.json"),
-      make("button", { type: "button", onclick: () => change(Object.fromEntries(Object.keys(state).map((k) => [k, ""]))) }, "Show all"));
+      make("button", { type: "button", onclick: () => { all = true; change(Object.fromEntries(Object.keys(state).map((k) => [k, ""]))); } }, "Show all"));
     host.append(make("div", { className: "claims-controls" }, ...nodes), count);
 
     function chosen() {
@@ -56,6 +58,8 @@
       rows.forEach((row, id) => { if (row) row.hidden = !ids.has(id); });
       const sorted = state.order ? [...claims].sort((a, b) => a[state.order].localeCompare(b[state.order])) : claims;
       for (const c of sorted) { const row = rows.get(c.id); if (row) homes.get(row).append(row); }
+      const looking = Object.values(state).some(Boolean);
+      for (const fold of folds) fold.open = all || looking;
       // A source without a row left hides, heading and all.
       for (const table of new Set(homes.values())) {
         const section = table.closest("section"), left = [...table.querySelectorAll("tr[id]")].some((row) => !row.hidden);
@@ -75,7 +79,11 @@
         Object.keys(state).forEach((key) => { state[key] = ""; });
         show();
         const row = document.getElementById(hash);
-        if (row) { row.querySelector("details").open = true; row.scrollIntoView({ block: "center" }); }
+        if (row) {
+          for (let fold = row.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = true;
+          row.querySelector("details").open = true;
+          row.scrollIntoView({ block: "center" });
+        }
         return;
       }
       const given = new URLSearchParams(hash);

@@ -27,8 +27,19 @@ def shown(page):
     return page.evaluate(f"{rows}.filter(r => r.checkVisibility()).map(r => r.id.slice(4))")
 
 
-def test_every_claim_has_its_row(page):
+def test_the_page_opens_short_and_every_claim_has_its_row(page):
+    assert shown(page) == []
+    assert page.evaluate("document.documentElement.scrollHeight") < 6000
+    counts = page.locator(".claims-work > summary").all_inner_texts()
+    assert sum(int(text.split()[0]) for text in counts) == len(LEDGER)
+    page.get_by_role("button", name="Show all").click()
     assert sorted(shown(page)) == sorted(LEDGER)
+
+
+def test_a_source_unfolds_by_its_line(page):
+    page.locator(".claims-work > summary").nth(1).press("Enter")
+    wanted = [n for n, c in LEDGER.items() if c.source.startswith("lecture16")]
+    assert shown(page) == wanted
 
 
 def test_filters_combine(page):
@@ -129,4 +140,4 @@ def test_segments_of_the_front_page_open_what_they_count(browser):
 
 def test_without_scripts_the_tables_are_there(html, documents):
     soup = documents[html / f"{PAGE}.html"]
-    assert len(soup.select(".claims-table tr[id]")) == len(LEDGER)
+    assert len(soup.select("details.claims-work[open] .claims-table tr[id]")) == len(LEDGER)

@@ -59,3 +59,19 @@ def test_numbers_of_numpy_are_printed_as_numbers():
 def test_refuses_what_is_no_table(rows, says):
     with pytest.raises(ValueError, match=says):
         table(rows, ("x", "y"), caption="c")
+
+
+@pytest.mark.parametrize(
+    ("written", "shown"),
+    [
+        ("6.6e+04", "66,000"),
+        ("2e+01", "20"),
+        ("1.25e+01", "12.5"),
+        ("-1.5e+02", "-150"),
+        ("1e+06", "1e+06"),
+        ("3.4e-01", "3.4e-01"),
+        ("as 1e+02", "as 1e+02"),
+    ],
+)
+def test_numbers_below_a_million_are_written_out(written, shown):
+    assert repr(table([(written,)], ("x",), caption="c")).splitlines()[-1] == shown

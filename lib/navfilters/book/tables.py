@@ -8,13 +8,14 @@ from typing import Any
 from navfilters.book.claims import Page
 
 _NUMBER = re.compile(r"[<>≤≥~±+-]*\.?\d[\d.,]*(e[+-]?\d+)?\s?[%×]?|nan|[+-]?inf|–")
+_BELOW_A_MILLION = re.compile(r"-?\d(?:\.(\d+))?e\+0([1-5])")
 _POWER = re.compile(r"(?<=\d)e([+-]?\d+)")
 
 
 def table(
     rows: Iterable[Sequence[Any]], columns: Sequence[str] | Mapping[str, str], *, caption: str
 ) -> Page:
-    """A table of results, to be the last line of a cell.
+    """A table of results: the last line of a cell, or displayed.
 
     Parameters
     ----------
@@ -22,7 +23,7 @@ def table(
         The first item of a row is its heading. Booleans become yes and no, None an empty cell.
     columns : sequence of str, or mapping of str to str
         Headings; a mapping gives each a format for its numbers, such as ".1f". A number without
-        one is printed as ".4g". The pages' rule holds: no finer than the numbers are certain.
+        one is printed as ".4g"; 6.6e+04 becomes 66,000.
     caption : str
         What the table holds, with units.
 
@@ -61,9 +62,12 @@ def _text(item: Any, form: str) -> str:
         item = item.item()
     if isinstance(item, bool):
         return "yes" if item else "no"
-    if isinstance(item, str):
-        return item
-    return format(item, form or ("d" if isinstance(item, int) else ".4g"))
+    if not isinstance(item, str):
+        item = format(item, form or ("d" if isinstance(item, int) else ".4g"))
+    if found := _BELOW_A_MILLION.fullmatch(item):
+        digits, exponent = len(found[1] or ""), int(found[2])
+        return f"{float(item):,.{max(digits - exponent, 0)}f}"
+    return item
 
 
 def _numeric(column: Sequence[str]) -> bool:

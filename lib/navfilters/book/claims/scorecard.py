@@ -41,10 +41,24 @@ def scorecard(work: str) -> Page:
     chosen = [c for c in load().values() if work_of(c) == work]
     if not chosen:
         raise ClaimError(f"no claim of {work!r} in {find()}")
-    page = table_of(
-        "claims-table", ("claim", "paper", "ours", "verdict"), [_row(c) for c in chosen]
+    head = ("claim", "paper", "ours", "verdict")
+    page = table_of("claims-table", head, [_row(c) for c in chosen])
+    return Page(_folding(chosen, page), "\n".join(repr(Badge(c)) for c in chosen))
+
+
+def _folding(chosen: list[Claim], page: str) -> str:
+    """A table under a line that counts its verdicts; the page's script folds it."""
+    counts = Counter(c.verdict for c in chosen)
+    told = ", ".join(
+        f'<span class="claim-{slug(v)}"><span class="claim-verdict">{counts[v]} {v}</span></span>'
+        for v in VERDICTS
+        if counts[v]
     )
-    return Page(page, "\n".join(repr(Badge(c)) for c in chosen))
+    noun = "claim" if len(chosen) == 1 else "claims"
+    return (
+        f'<details class="claims-work" open><summary>{len(chosen)} {noun}: {told}</summary>'
+        f"{page}</details>"
+    )
 
 
 def _row(c: Claim) -> str:
