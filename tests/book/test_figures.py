@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from browser import ROOT
 from numpy.testing import assert_allclose
+from shown import settled, told
 
 from navfilters import SigmaPoints, run
 from navfilters.book import claims
@@ -34,17 +35,6 @@ def page(browser):
         visit.page.wait_for_selector("[data-figure=start] .stage[data-ready]")
         visit.page.wait_for_selector("[data-figure=two-updates] .stage[data-ready]")
         yield visit.page
-
-
-def told(page, figure, key):
-    """A number that a figure shows."""
-    selector = f"[data-figure={figure}] .stage"
-    return float(page.evaluate(f"document.querySelector('{selector}').dataset.{key}"))
-
-
-def settled(page):
-    """Wait for the drawing that an input asked for."""
-    page.evaluate("() => new Promise(done => requestAnimationFrame(() => setTimeout(done, 50)))")
 
 
 @pytest.mark.parametrize("name", FILTERS)
@@ -165,7 +155,14 @@ def test_sigma_points_at_work(browser):
 
 
 @pytest.mark.parametrize(
-    "name", [DIVERGENCE, "book/beyond/divergence-maps", "book/range-bearing/unscented-filter"]
+    "name",
+    [
+        DIVERGENCE,
+        "book/beyond/divergence-maps",
+        "book/range-bearing/unscented-filter",
+        "book/orbit-manoeuvre/limits",
+        "book/beyond/every-cure",
+    ],
 )
 def test_every_control_has_a_name(browser, name):
     with browser.visit(name) as visit:

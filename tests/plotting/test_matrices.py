@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from navfilters.book.plotting import honesty_matrix
-from navfilters.book.plotting.matrices import compact
+from navfilters.book.printing import compact
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,13 @@
     await script(`${host.dataset.figure}.js`);
     root.figures[host.dataset.figure](host.querySelector(".stage"), settings);
     host.classList.add("computes");
-    if (host.dataset.instead) host.closest(".cell")?.previousElementSibling?.classList.add("stands-in");
+    let cell = host.closest(".cell"), wanted = null;
+    for (let i = host.dataset.instead ? Number(host.dataset.instead) || 1 : 0; cell && i > 0; i--) {
+      cell = cell.previousElementSibling;
+      cell?.classList.add("stands-in");
+      wanted ??= location.hash && cell?.querySelector(`[id="${CSS.escape(decodeURIComponent(location.hash.slice(1)))}"]`);
+    }
+    if (wanted) host.scrollIntoView(); // the address of a picture whose place the figure takes
   }
   document.addEventListener("DOMContentLoaded", () => {
     document.querySelectorAll("[data-figure]").forEach(start);

@@ -114,19 +114,22 @@
     drawing.append(element("svg:text", { x: X(a), y: Y(b), ...attributes }, text));
   }
 
-  // A point that can be dragged, or moved with the arrow keys (with Shift in small steps).
+  // A point that can be dragged, or moved with the arrow keys (with Shift in small steps). On an axis of
+  // powers of ten a step is one of decades.
   function handle(axes, { name, get, set, step }) {
     const knob = element("svg:circle", { class: "handle", r: 9, tabindex: 0, role: "button" });
     const inside = (value, [low, high]) => Math.min(high, Math.max(low, value));
     const move = ([a, b]) => set([inside(a, axes.x.range), inside(b, axes.y.range)]);
+    const moved = (axis, value, size) => (axis.log ? value * 10 ** size : value + size);
+    const rounded = (axis, value) => (axis.log ? Number(value.toPrecision(3)) : Math.round(value * 10) / 10);
     knob.addEventListener("pointerdown", (event) => { knob.setPointerCapture(event.pointerId); event.preventDefault(); knob.focus(); });
-    knob.addEventListener("pointermove", (event) => { if (knob.hasPointerCapture(event.pointerId)) move(axes.at(event).map((v) => Math.round(v * 10) / 10)); });
+    knob.addEventListener("pointermove", (event) => { if (knob.hasPointerCapture(event.pointerId)) { const [a, b] = axes.at(event); move([rounded(axes.x, a), rounded(axes.y, b)]); } });
     knob.addEventListener("keydown", (event) => {
       const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
       if (!ways) return;
       event.preventDefault();
       const size = event.shiftKey ? step / 10 : step, [a, b] = get();
-      move([a + size * ways[0], b + size * ways[1]]);
+      move([moved(axes.x, a, size * ways[0]), moved(axes.y, b, size * ways[1])]);
     });
     axes.handles.append(knob);
     return () => {

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from navfilters.book.printing import MARKS, compact
 from navfilters.numerics.extras import missing
 
 try:
@@ -13,31 +14,6 @@ try:
     from matplotlib.patches import Rectangle
 except ImportError as error:
     raise missing("matplotlib", "navfilters[book]", "plotting", error) from None
-
-MARKS = {-1: "▽", 0: "●", 1: "▲"}
-"""Too cautious, honest, over-confident."""
-
-
-def compact(x: float) -> str:
-    """A positive number in three or four characters.
-
-    Parameters
-    ----------
-    x : float
-
-    Returns
-    -------
-    str
-    """
-    if np.isnan(x):
-        return ""
-    if x >= 1e99:
-        return "∞"
-    if x >= 999.5:
-        return f"1e{np.log10(x):.0f}"
-    if x >= 9.95:
-        return f"{x:.0f}"
-    return f"{x:.1f}" if x >= 0.095 else "<.1"
 
 
 def honesty_matrix(
