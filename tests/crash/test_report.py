@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 from bs4 import BeautifulSoup
-from faulty import ekf
 
 from navfilters import FILTERS
 from navfilters.__main__ import main as navfilters
 from navfilters.crash import CHECKS, Case, crash_test, from_filterpy, from_functions
 from navfilters.crash import suite as suites
+from navfilters.crash.planted import ekf
 
 pytest_plugins = ["navfilters.crash.pytest_plugin"]
 
@@ -116,7 +116,7 @@ def test_bad_input_is_refused(call, message):
 
 
 MINE = """
-from faulty import ekf
+from navfilters.crash.planted import ekf
 right, wrong = ekf(), ekf("no wrap")
 """
 

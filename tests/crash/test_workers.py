@@ -4,10 +4,10 @@ import os
 import sys
 
 import pytest
-from faulty import ekf
 
 from navfilters import FILTERS
 from navfilters.crash import CHECKS, SUITES, crash_test, from_functions
+from navfilters.crash.planted import ekf
 from navfilters.crash.subject import Subject
 from navfilters.crash.suite import updates
 from navfilters.problems import static_fix

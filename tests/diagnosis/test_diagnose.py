@@ -72,6 +72,29 @@ def test_when_it_stopped_being_right(late):
     assert diagnose(kalman_log(3), window=25).stopped is None
 
 
+def test_too_careful_first_and_too_sure_later():
+    """Below its band from the start, above it from the fault on: both moments are told."""
+    log, late = kalman_log(3, told_r=4.0, told_q=4.0), slice(250, None)
+    S = log.S.copy()
+    S[late] /= 60
+    found = diagnose(replace(log, S=S), window=25)
+    assert found.stopped == 1.0
+    assert 225 < found.above <= 276
+    sides = [f for f in found.findings if "window" in f]
+    assert sides[0].endswith("begins at 1, below it")
+    assert sides[1].endswith(f"too sure, begins at {found.above:g}")
+
+
+def test_an_echo_is_found_at_its_lag():
+    log = kalman_log()
+    y = log.innovation.copy()
+    y[3:, 0] += y[:-3, 0]
+    found = diagnose(replace(log, innovation=y)).channels[0]
+    assert found.coloured
+    assert found.lag == 3
+    assert 0.3 < found.at_lag < 0.7
+
+
 def test_errors_beside_their_covariance():
     right, wrong = diagnose(kalman_log()), diagnose(kalman_log(told_r=0.1, told_q=0.1))
     assert right.nees_low < right.nees_ratio < right.nees_high

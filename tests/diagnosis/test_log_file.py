@@ -1,19 +1,24 @@
 """Logs as files: what is read, and what every fault is called."""
 
+import sys
+
 import numpy as np
 import pytest
-from logs import kalman_log, written
+from logs import kalman_log
 from numpy.testing import assert_array_equal
 
 from navfilters.__main__ import main as navfilters
-from navfilters.diagnosis import Log, LogError, diagnose, read_log
+from navfilters.diagnosis import Log, LogError, diagnose, read_log, write_log
 
 HEAD = "time,innovation_1,S_11\n"
 
 
-def test_what_is_written_is_read(tmp_path):
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_what_is_written_is_read(tmp_path, ending):
+    if ending == "parquet":
+        pytest.importorskip("pyarrow")
     log = kalman_log(gaps=0.3)
-    again = read_log(written(log, tmp_path / "log.csv"))
+    again = read_log(write_log(log, tmp_path / f"log.{ending}"))
     for name in ("time", "innovation", "error"):
         assert_array_equal(getattr(again, name), getattr(log, name))
     for name in ("S", "P"):  # one triangle is written
@@ -58,6 +63,40 @@ def test_what_is_wrong_with_a_file_is_said(tmp_path, content, message):
     assert str(path) in str(error.value)
 
 
+def test_parquet_with_other_columns_and_gaps(tmp_path):
+    """Whole numbers, text and absent cells, as other programs write them."""
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    table = {"time": [0, 1, 2], "innovation_1": [1.0, None, -1.0], "S_11": [2, 2, 2]}
+    path = tmp_path / "log.parquet"
+    parquet.write_table(pyarrow.table(table | {"note": ["a", "b", None]}), path)
+    log = read_log(path)
+    assert_array_equal(log.innovation[:, 0], [1.0, np.nan, -1.0])
+    assert log.ignored == ("note",)
+
+
+def test_a_parquet_column_of_dates_is_refused(tmp_path):
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    table = {"time": ["2010-11-02"], "innovation_1": [1.0], "S_11": [2]}
+    parquet.write_table(pyarrow.table(table), tmp_path / "log.parquet")
+    with pytest.raises(LogError, match="time must be numbers; found string"):
+        read_log(tmp_path / "log.parquet")
+
+
+def test_parquet_without_pyarrow_says_so(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.delitem(sys.modules, "pyarrow.parquet", raising=False)
+    with pytest.raises(ImportError, match="a log in Parquet needs pyarrow: pip install pyarrow"):
+        read_log(tmp_path / "log.parquet")
+
+
+def test_more_than_nine_channels(tmp_path):
+    S = np.broadcast_to(np.eye(11), (2, 11, 11))
+    log = Log(np.arange(2.0), np.ones((2, 11)), S)
+    assert_array_equal(read_log(write_log(log, tmp_path / "log.csv")).S, S)
+
+
 def test_what_is_no_text(tmp_path):
     path = tmp_path / "log.csv"
     path.write_bytes(b"\xff\xfe\x00\x01")
@@ -79,8 +118,8 @@ def test_arrays_that_do_not_fit(fields, message):
 
 
 def test_the_command_and_its_exit_status(tmp_path, capsys):
-    good = written(kalman_log(), tmp_path / "good.csv")
-    bad = written(kalman_log(told_r=0.1), tmp_path / "bad.csv")
+    good = write_log(kalman_log(), tmp_path / "good.csv")
+    bad = write_log(kalman_log(told_r=0.1), tmp_path / "bad.csv")
     assert navfilters(["diagnose", str(good)]) == 0
     assert "nothing wrong at 95%" in capsys.readouterr().out
     numbers, picture = tmp_path / "found.json", tmp_path / "found.png"
@@ -102,7 +141,7 @@ def test_the_command_and_its_exit_status(tmp_path, capsys):
     ],
 )
 def test_the_command_says_what_is_wrong(tmp_path, capsys, arguments, message):
-    written(kalman_log(steps=20), tmp_path / "log.csv")
+    write_log(kalman_log(steps=20), tmp_path / "log.csv")
     given = [str(tmp_path / a) if a.endswith(".csv") else a for a in arguments]
     with pytest.raises(SystemExit) as end:
         navfilters(["diagnose", *given])

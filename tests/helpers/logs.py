@@ -29,18 +29,3 @@ def kalman_log(seed=0, steps=400, *, told_r=1.0, told_q=1.0, late=None, gaps=0.0
         mean, P = mean + K @ (H @ y), P - K @ H @ P
         rows[-1] += (mean - x, P)
     return Log(*(np.array(column) for column in zip(*rows, strict=True)))
-
-
-def written(log, path):
-    """The log as a CSV file."""
-    m, n = log.innovation.shape[1], log.error.shape[1]
-    pairs = [(i, j) for i in range(m) for j in range(i, m)]
-    names = ["time", *(f"innovation_{i + 1}" for i in range(m))]
-    names += [f"S_{i + 1}{j + 1}" for i, j in pairs]
-    names += [*(f"error_{i + 1}" for i in range(n)), *(f"P_{i + 1}{j + 1}" for i, j in pairs)]
-    lines = [",".join(names)]
-    for t, y, S, e, P in zip(log.time, log.innovation, log.S, log.error, log.P, strict=True):
-        cells = [t, *y, *(S[i, j] for i, j in pairs), *e, *(P[i, j] for i, j in pairs)]
-        lines.append(",".join("" if np.isnan(c) else repr(float(c)) for c in cells))
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path

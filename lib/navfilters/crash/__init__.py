@@ -1,7 +1,8 @@
 """Crash test: what this book knows about filters, asked of yours."""
 
-from navfilters.crash.adapters import Adapted, from_filterpy, from_functions
+from navfilters.crash.adapters import Adapted, from_functions
 from navfilters.crash.check import Case, Check
+from navfilters.crash.filter_py import from_filterpy
 from navfilters.crash.report import Finding, Report
 from navfilters.crash.stone_soup import from_stonesoup
 from navfilters.crash.suite import CHECKS, SUITES, crash_test

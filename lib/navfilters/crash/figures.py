@@ -77,7 +77,7 @@ def _ekf(check: Callable[[Subject], Any]) -> Any:
 
 
 def _map(found: Map) -> tuple[str, str]:
-    figure, axes = _new(1, 2, (7.2, 3.7), sharey=True)
+    figure, axes = _new(1, 2, (5.6, 3.3), sharey=True)
     names = "your filter", "the book's EKF"
     for ax, name, each in zip(axes, names, (found, _ekf(starts)["map"]), strict=True):
         x, y = (np.unique(each.mean[:, i]) for i in (0, 1))
@@ -102,8 +102,8 @@ def _map(found: Map) -> tuple[str, str]:
 
 
 def _sweeps(found: dict[str, Swept]) -> tuple[str, str]:
-    figure, axes = _new(1, 2, (7.2, 3.2), sharey=True)
-    labels = "deviation of the first estimate (units)", "ratio of the noises (units per radian)"
+    figure, axes = _new(1, 2, (5.6, 3.1), sharey=True)
+    labels = "deviation of the start (units)", "ratio of the noises (units/rad)"
     for ax, label, (name, mine) in zip(axes, labels, found.items(), strict=True):
         theirs = _ekf(sweeps)["sweeps"][name]
         ax.loglog(mine.parameter, _floored(mine.gain), **YOURS, marker="o", markersize=4)
@@ -135,7 +135,7 @@ def _runs(found: Followed) -> tuple[str, str]:
     ]
     if best not in ("", "EKF"):
         drawn.append((f"its best honest one: {best}", of_cure(problem.name, best, runs), BEST))
-    figure, axes = _new(3, 1, (7.2, 7.0), sharex=True)
+    figure, axes = _new(3, 1, (5.6, 7.2), sharex=True)
     update = np.arange(len(mine.error))
     for name, each, look in drawn:
         axes[0].plot(update, each.error, label=name, **look)
@@ -154,6 +154,7 @@ def _runs(found: Followed) -> tuple[str, str]:
     axes[2].set(ylabel="NIS over its expectation", xlabel="update")
     for ax in axes:
         ax.set_yscale("log")
+        ax.yaxis.set_minor_formatter("")
     _within(axes[1])
     _within(axes[2])
     figure.legend(loc="outside upper center", ncols=2, frameon=False)
@@ -169,6 +170,6 @@ def _banded(ax: Any, ends: tuple[float, float]) -> None:
 
 
 def _within(ax: Any) -> None:
-    """No more than the decades that are read: what lies outside ends at the edge."""
+    """The decades that are read, at least two: what lies outside ends at the edge."""
     low, high = ax.get_ylim()
-    ax.set_ylim(max(low, 1e-3), min(max(high, 3.0), 1e4))
+    ax.set_ylim(min(max(low, 1e-3), 0.08), min(max(high, 12.0), 1e4))

@@ -78,7 +78,7 @@ p {{ margin: 0.3rem 0; }} pre {{ overflow-x: auto; border: 1px solid #8888; padd
 .case {{ font-size: 0.9rem; margin: 0.4rem 0; }}
 .bar {{ position: relative; height: 0.6rem; border: 1px solid #888; }}
 .in {{ background: #1a7f37; height: 100%; }} .out {{ background: #b3261e; height: 100%; }}
-figure {{ margin: 1rem 0; }} img {{ max-width: 100%; background: white; padding: 4px; }}
+figure {{ margin: 1rem 0; }} img {{ width: 100%; max-width: 42rem; background: white; }}
 figcaption {{ font-size: 0.9rem; }}
 .limit {{ position: absolute; left: 50%; top: -3px; bottom: -3px; border-left: 2px solid; }}
 </style></head><body><h1>{title}</h1>

@@ -1,54 +1,17 @@
 """Whether the innovations of one run are what the filter says that they are."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from navfilters.diagnosis.channels import Channel, channel
 from navfilters.diagnosis.log_file import Log
 from navfilters.numerics import validation
 from navfilters.runs.chi_square import tail_of
 from navfilters.runs.consistency import nees
 from navfilters.types import Array
-
-LAGS = 10
-
-
-@dataclass(frozen=True)
-class Channel:
-    """One component of the innovations, each over the deviation that the filter gave it.
-
-    Parameters
-    ----------
-    number : int
-        From 1.
-    count : int
-        How often it was measured.
-    bias : float
-        Mean, in deviations: 0 if the filter is right.
-    scale : float
-        Mean square: the factor on its variance in S that would make it right.
-    low, high : float
-        Confidence interval of ``scale``, if the innovations are white and Gaussian.
-    within : tuple of float
-        Shares within one, two and three deviations: 0.683, 0.954, 0.997 if the filter is right.
-    correlation : float
-        Of the whitened innovation with the one before: 0 if the filter is right.
-    biased, coloured : bool
-        What was found at the stated confidence.
-    """
-
-    number: int
-    count: int
-    bias: float
-    scale: float
-    low: float
-    high: float
-    within: tuple[float, float, float]
-    correlation: float
-    biased: bool
-    coloured: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +31,8 @@ class Diagnosis:
     windows : array (w, 4)
         First and last time of each window, its ratio over the ends of its band: below 1 and above
         1, in that order, where it is inside.
-    stopped : float, optional
-        First time of the first window outside its band.
+    stopped, above : float, optional
+        First time of the first window outside its band, and of the first above it.
     channels : tuple of Channel
     indefinite : int
         Updates whose S is not positive definite.
@@ -92,6 +55,7 @@ class Diagnosis:
     high: float
     windows: Array
     stopped: float | None
+    above: float | None
     channels: tuple[Channel, ...]
     indefinite: int
     confidence: float
@@ -108,7 +72,7 @@ class Diagnosis:
 
     def summary(self) -> dict[str, Any]:
         """Numbers and findings without the series, for JSON."""
-        kept = ("ratio", "low", "high", "stopped", "indefinite", "confidence")
+        kept = ("ratio", "low", "high", "stopped", "above", "indefinite", "confidence")
         numbers = {name: getattr(self, name) for name in kept}
         numbers |= {n: getattr(self, n) for n in ("nees_ratio", "nees_low", "nees_high")}
         channels = [asdict(c) for c in self.channels]
@@ -163,24 +127,26 @@ def diagnose(
     total = int(dof[good].sum())
     ratio = float(nis[good].sum() / total)
     low, high = (float(stats.chi2.ppf(p, total) / total) for p in (tail, 1 - tail))
-    windows, stopped = _windows(log.time[good], nis[good], dof[good], window, 2 * tail)
-    channels = tuple(_channel(i, y[:, i], log.S[:, i, i], white[:, i], tail) for i in range(m))
-    found = Diagnosis(
-        log.time, nis, dof, ratio, low, high, windows, stopped, channels, indefinite, confidence
-    )
-    extra = {} if log.error is None else _errors(log, tail)
-    found = Diagnosis(**{**found.__dict__, **extra})
-    return Diagnosis(**{**found.__dict__, "findings": tuple(_findings(found))})
+    windows = _windows(log.time[good], nis[good], dof[good], window, 2 * tail)
+    beyond = windows[:, 2] > 1
+    outside = beyond | (windows[:, 3] < 1)
+    stopped, above = (float(windows[w][0, 0]) if w.any() else None for w in (outside, beyond))
+    channels = tuple(channel(i + 1, y[:, i], log.S[:, i, i], white[:, i], tail) for i in range(m))
+    common = log.time, nis, dof, ratio, low, high, windows, stopped, above, channels
+    found = Diagnosis(*common, indefinite, confidence)
+    if log.error is not None:
+        found = replace(found, **_errors(log, tail))
+    return replace(found, findings=tuple(_findings(found)))
 
 
 def _wrapped(y: Array, angles: Mapping[int, float]) -> Array:
     y = y.copy()
-    for channel, period in angles.items():
-        if not 1 <= channel <= y.shape[1]:
-            raise ValueError(f"angles must name channels 1 to {y.shape[1]}; found {channel}")
+    for number, period in angles.items():
+        if not 1 <= number <= y.shape[1]:
+            raise ValueError(f"angles must name channels 1 to {y.shape[1]}; found {number}")
         if not 0 < period < np.inf:
             raise ValueError(f"angles must have positive periods; found {period}")
-        y[:, channel - 1] -= period * np.ceil(y[:, channel - 1] / period - 0.5)
+        y[:, number - 1] -= period * np.ceil(y[:, number - 1] / period - 0.5)
     return y
 
 
@@ -205,54 +171,23 @@ def _whitened(y: Array, S: Array) -> tuple[Array, Array, Array, int]:
     return white, nis, dof, int(bad.sum())
 
 
-def _windows(time: Array, nis: Array, dof: Array, size: int, alpha: float):
-    """Ratio of every window beside its band, and the first time of the first one outside."""
+def _windows(time: Array, nis: Array, dof: Array, size: int, alpha: float) -> Array:
+    """Ratio of every window over the ends of its band."""
     from scipy import stats
 
     starts = range(0, max(1, len(nis) - size // 2), size)
-    rows, stopped = [], None
+    rows = []
     for begin in starts:
         last = len(nis) if begin + size + size // 2 > len(nis) else begin + size
         total = dof[begin:last].sum()
         ratio = nis[begin:last].sum() / total
         ends = [stats.chi2.ppf(p, total) / total for p in _ends(alpha / len(starts))]
         rows.append((time[begin], time[last - 1], ratio / ends[1], ratio / ends[0]))
-        if stopped is None and not ends[0] <= ratio <= ends[1]:
-            stopped = float(time[begin])
-    return np.array(rows), stopped
+    return np.array(rows)
 
 
 def _ends(alpha: float) -> tuple[float, float]:
     return alpha / 2, 1 - alpha / 2
-
-
-def _channel(i: int, y: Array, variance: Array, white: Array, tail: float) -> Channel:
-    from scipy import stats
-
-    with np.errstate(invalid="ignore"):
-        r = y / np.sqrt(np.where(variance > 0, variance, np.nan))
-    r = r[np.isfinite(r)]
-    if not r.size:
-        nothing = float("nan")
-        return Channel(
-            i + 1, 0, nothing, nothing, nothing, nothing, (nothing,) * 3, 0.0, False, False
-        )
-    n, bias, scale = len(r), float(r.mean()), float(np.mean(r**2))
-    low, high = (scale * n / stats.chi2.ppf(p, n) for p in (1 - tail, tail))
-    spread = r.std() if n > 1 else 1.0
-    limit = stats.t.ppf(1 - tail, max(n - 1, 1))
-    biased = bool(n > 1 and abs(bias) * np.sqrt(n) > limit * spread)
-    u = white[np.isfinite(white)]
-    u = u - u.mean() if u.size else u
-    lags = min(LAGS, len(u) // 4)
-    power = float(u @ u)
-    r_lag = np.array([u[k:] @ u[:-k] for k in range(1, lags + 1)]) / (power or 1.0)
-    box = len(u) * (len(u) + 2) * np.sum(r_lag**2 / (len(u) - np.arange(1, lags + 1)))
-    coloured = bool(lags and box > stats.chi2.ppf(1 - 2 * tail, lags))
-    one, two, three = (float(np.mean(np.abs(r) <= k)) for k in (1, 2, 3))
-    within = (one, two, three)
-    first = float(r_lag[0]) if lags else 0.0
-    return Channel(i + 1, n, bias, scale, float(low), float(high), within, first, biased, coloured)
 
 
 def _errors(log: Log, tail: float) -> dict[str, Any]:
@@ -285,13 +220,16 @@ def _findings(d: Diagnosis):
         way = "too sure" if d.ratio > d.high else "not sure enough"
         yield f"the filter is {way}: NIS {d.ratio:.2f} times what it should be"
     if d.stopped is not None:
-        yield f"the first window outside its band begins at {d.stopped:g}"
+        side = "above" if d.stopped == d.above else "below"
+        yield f"the first window outside its band begins at {d.stopped:g}, {side} it"
+        if d.above not in (None, d.stopped):
+            yield f"the first window above its band, too sure, begins at {d.above:g}"
     for c in d.channels:
         if c.biased:
             yield f"channel {c.number} is biased by {c.bias:.2f} deviations"
         if c.coloured:
-            before = f"correlation {c.correlation:.2f} with the one before"
-            yield f"channel {c.number} is not white: {before}"
+            apart = "with the one before" if c.lag == 1 else f"at {c.lag} updates apart"
+            yield f"channel {c.number} is not white: correlation {c.at_lag:.2f} {apart}"
     if d.nees_ratio is not None and d.nees_low is not None and d.nees_high is not None:
         wrong = f"NEES {d.nees_ratio:.2f} times what it should be"
         if d.nees_ratio > d.nees_high:

@@ -129,12 +129,48 @@ def read_log(path: str | Path) -> Log:
     if innovation is None:
         raise LogError(f"{path}: column innovation_1 is needed; found {', '.join(columns)}")
     error, P = _block(path, columns, "error", "P")
-    known = [n for n in columns if n == "time" or _VECTOR.fullmatch(n) or _MATRIX.fullmatch(n)]
-    ignored = tuple(name for name in columns if name not in known)
+    ignored = tuple(name for name in columns if not _used(name))
     try:
         return Log(columns["time"], innovation, S, error, P, ignored)
     except LogError as fault:
         raise LogError(f"{path}: {fault}") from None
+
+
+def write_log(log: Log, path: str | Path) -> Path:
+    """Write a log that :func:`read_log` reads.
+
+    Parameters
+    ----------
+    log : Log
+    path : path
+        A CSV file; with the ending .parquet a Parquet file, which needs pyarrow.
+
+    Returns
+    -------
+    Path
+    """
+    path, columns = Path(path), {"time": log.time}
+    for name, vector, matrix, cov in (
+        ("innovation", log.innovation, "S", log.S),
+        ("error", log.error, "P", log.P),
+    ):
+        if vector is None or cov is None:
+            continue
+        size = vector.shape[1]
+        columns |= {f"{name}_{i + 1}": vector[:, i] for i in range(size)}
+        for i in range(size):
+            columns |= {_names(matrix, i + 1, j + 1)[0]: cov[:, i, j] for j in range(i, size)}
+    if path.suffix == ".parquet":
+        parquet = needed("pyarrow.parquet", "pyarrow", "a log in Parquet")
+        pyarrow = needed("pyarrow", "pyarrow", "a log in Parquet")
+        parquet.write_table(pyarrow.table(columns), path)
+        return path
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(columns)
+        for row in zip(*columns.values(), strict=True):
+            table.writerow("" if np.isnan(x) else repr(float(x)) for x in row)
+    return path
 
 
 def _csv(path: Path) -> dict[str, np.ndarray]:
@@ -153,12 +189,16 @@ def _csv(path: Path) -> dict[str, np.ndarray]:
     for line, row in filled:
         if len(row) != len(names):
             raise LogError(f"{path}, line {line}: {len(names)} cells are needed; found {len(row)}")
-    used = [n for n in names if n == "time" or _VECTOR.fullmatch(n) or _MATRIX.fullmatch(n)]
     columns: dict[str, np.ndarray] = {name: np.empty(0) for name in names}
-    for name in used:
+    for name in filter(_used, names):
         j = names.index(name)
         columns[name] = np.array([_number(path, line, name, row[j]) for line, row in filled])
     return columns
+
+
+def _used(name: str) -> bool:
+    """Whether a column of this name belongs to a log."""
+    return bool(name == "time" or _VECTOR.fullmatch(name) or _MATRIX.fullmatch(name))
 
 
 def _number(path: Path, line: int, name: str, cell: str) -> float:
@@ -174,7 +214,10 @@ def _parquet(path: Path) -> dict[str, np.ndarray]:
     columns = {}
     for name in table.column_names:
         values = table[name].to_numpy()
-        columns[name] = values.astype(float) if values.dtype.kind in "iuf" else np.empty(0)
+        number = values.dtype.kind in "iuf"
+        if _used(name) and not number:
+            raise LogError(f"{path}: {name} must be numbers; found {table[name].type}")
+        columns[name] = values.astype(float) if number else np.empty(0)
     return columns
 
 
