@@ -24,6 +24,16 @@ FOLDER = Path(__file__).resolve().parent
 NEAR = 10  # of 255: how far a colour may move when a picture gets a palette
 
 
+# What the theme writes into every page: the search's index, which only the search needs, and marks
+# that a screen reader cannot make sense of.
+MENDED = (
+    (re.compile(r'<script src="[./]*_static/(?:searchtools|language_data)\.js"></script>\s*'), ""),
+    (re.compile(r'<script src="[./]*searchindex\.js"></script>\s*'), ""),
+    (re.compile(r'<div role="list" class="citation-list">'), '<div class="citation-list">'),
+    (re.compile(r"<summary>(?=<span class=.toctree-toggle)"), '<summary aria-label="its pages">'),
+)
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Connect to Sphinx."""
     app.connect("autodoc-skip-member", without_description)
@@ -98,10 +108,22 @@ def lighter(app, exception) -> None:
     if exception or app.builder.format != "html":
         return
     out = Path(app.outdir)
+    for page in out.rglob("*.html"):
+        mend(page)
     few_icons(out)
     few_characters(out / "_static")
     for picture in sorted((out / "_images").glob("*.png")):
         with_palette(picture)
+
+
+def mend(page: Path) -> None:
+    """Take out of a page what it does not need, and name what has no name."""
+    before = after = page.read_text(encoding="utf-8")
+    for pattern, new in MENDED:
+        if new or page.name != "search.html":
+            after = pattern.sub(new, after)
+    if after != before:
+        page.write_text(after, encoding="utf-8")
 
 
 def few_icons(out: Path) -> None:
