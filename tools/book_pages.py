@@ -33,6 +33,12 @@ MENDED = (
     (re.compile(r"<summary>(?=<span class=.toctree-toggle)"), '<summary aria-label="its pages">'),
 )
 
+# An equation whose label begins with a source's name has that source's number: xiong2009-a14.
+EQUATION = re.compile(
+    r'(id="equation-(perea2007|lecture16|xiong2009|pogorelsky2020)-([\w-]+)">'
+    r'\s*<span class="eqno">)(\(\d+\))'
+)
+
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Connect to Sphinx."""
@@ -122,8 +128,19 @@ def mend(page: Path) -> None:
     for pattern, new in MENDED:
         if new or page.name != "search.html":
             after = pattern.sub(new, after)
+    after = EQUATION.sub(_both_numbers, after)
     if after != before:
         page.write_text(after, encoding="utf-8")
+
+
+def _both_numbers(found: re.Match) -> str:
+    """Our number of an equation, and the source's."""
+    theirs = ", ".join(
+        "–".join(f"({n.replace('a', 'A.')})" for n in part.split("-to-"))
+        for part in re.findall(r"\w+-to-\w+|\w+", found[3])
+    )
+    source = f'<span class="eqno-source">{found[2]} {theirs}</span>'
+    return f"{found[1]}{source} {found[4]}"
 
 
 def few_icons(out: Path) -> None:
