@@ -24,6 +24,22 @@ FOLDER = Path(__file__).resolve().parent
 NEAR = 10  # of 255: how far a colour may move when a picture gets a palette
 
 
+# What the theme writes into every page: the search's index, which only the search needs, and marks
+# that a screen reader cannot make sense of.
+MENDED = (
+    (re.compile(r'<script src="[./]*_static/(?:searchtools|language_data)\.js"></script>\s*'), ""),
+    (re.compile(r'<script src="[./]*searchindex\.js"></script>\s*'), ""),
+    (re.compile(r'<div role="list" class="citation-list">'), '<div class="citation-list">'),
+    (re.compile(r"<summary>(?=<span class=.toctree-toggle)"), '<summary aria-label="its pages">'),
+)
+
+# An equation whose label begins with a source's name has that source's number: xiong2009-a14.
+EQUATION = re.compile(
+    r'(id="equation-(perea2007|lecture16|xiong2009|pogorelsky2020)-([\w-]+)">'
+    r'\s*<span class="eqno">)(\(\d+\))'
+)
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Connect to Sphinx."""
     app.connect("autodoc-skip-member", without_description)
@@ -98,10 +114,33 @@ def lighter(app, exception) -> None:
     if exception or app.builder.format != "html":
         return
     out = Path(app.outdir)
+    for page in out.rglob("*.html"):
+        mend(page)
     few_icons(out)
     few_characters(out / "_static")
     for picture in sorted((out / "_images").glob("*.png")):
         with_palette(picture)
+
+
+def mend(page: Path) -> None:
+    """Take out of a page what it does not need, and name what has no name."""
+    before = after = page.read_text(encoding="utf-8")
+    for pattern, new in MENDED:
+        if new or page.name != "search.html":
+            after = pattern.sub(new, after)
+    after = EQUATION.sub(_both_numbers, after)
+    if after != before:
+        page.write_text(after, encoding="utf-8")
+
+
+def _both_numbers(found: re.Match) -> str:
+    """Our number of an equation, and the source's."""
+    theirs = ", ".join(
+        "–".join(f"({n.replace('a', 'A.')})" for n in part.split("-to-"))
+        for part in re.findall(r"\w+-to-\w+|\w+", found[3])
+    )
+    source = f'<span class="eqno-source">{found[2]} {theirs}</span>'
+    return f"{found[1]}{source} {found[4]}"
 
 
 def few_icons(out: Path) -> None:

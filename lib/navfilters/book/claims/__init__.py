@@ -8,6 +8,7 @@ found to equal.
 """
 
 from .checking import check
+from .essay import omissions, told, verdicts_of
 from .ledger import (
     ESTABLISHED,
     IN_SHAPE,
@@ -53,8 +54,11 @@ __all__ = [
     "load",
     "load_statements",
     "load_words",
+    "omissions",
     "rules",
     "scorecard",
     "statements",
     "summary",
+    "told",
+    "verdicts_of",
 ]
