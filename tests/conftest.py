@@ -6,9 +6,12 @@ import re
 from pathlib import Path
 
 import pytest
+import xla
 from hypothesis import settings
 
-os.environ["JAX_ENABLE_X64"] = "1"  # read when JAX is imported
+# Read when JAX is imported. XLA_FLAGS= make coverage compiles everything as users do.
+os.environ["JAX_ENABLE_X64"] = "1"
+os.environ.setdefault("XLA_FLAGS", " ".join(xla.QUICKLY))
 
 settings.register_profile(
     "deterministic", derandomize=True, deadline=None, max_examples=50, database=None
@@ -36,3 +39,15 @@ def pytest_collection_modifyitems(items):
         engine = item.callspec.params.get("engine") if hasattr(item, "callspec") else None
         if engine == "jax" and not HAS_JAX:
             item.add_marker(pytest.mark.skip(reason="needs JAX"))
+
+
+@pytest.fixture
+def compiled_as_users_do(monkeypatch):
+    """The engine's programs with all of XLA's optimisations."""
+    stages = pytest.importorskip("jax").stages
+    compiled = pytest.importorskip("navfilters.runs.compiled")
+    compile_ = stages.Lowered.compile
+    monkeypatch.setattr(stages.Lowered, "compile", lambda self: compile_(self, xla.AS_USERS_DO))
+    compiled._program.cache_clear()
+    yield
+    compiled._program.cache_clear()

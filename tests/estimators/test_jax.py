@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from naive import covariances, quadratic
 from numpy.testing import assert_allclose
+from xla import AS_USERS_DO
 
 from navfilters import FILTERS, Gaussian, SigmaPoints
 from navfilters.models import Linear, RangeBearing
@@ -21,8 +22,8 @@ def options_of(name, root="cholesky"):
     return {key: values[key] for key in FILTERS[name].options}
 
 
-def compiled(name, model, **options):
-    return jax.jit(lambda prior, z: FILTERS[name](prior, z, model, **options))
+def compiled(name, model, xla=None, **options):
+    return jax.jit(lambda prior, z: FILTERS[name](prior, z, model, **options), compiler_options=xla)
 
 
 def problem(count=6):
@@ -57,9 +58,10 @@ def assert_agree(got, wanted, prior):
 
 @every_filter
 def test_one_member(name):
+    """With all of XLA's optimisations."""
     prior, z, model = problem()
     one = Gaussian(prior.mean[0], prior.cov[0])
-    got = compiled(name, model, **options_of(name))(one, z[0])
+    got = compiled(name, model, AS_USERS_DO, **options_of(name))(one, z[0])
     assert_agree(got, FILTERS[name](one, z[0], model, **options_of(name)), one)
 
 

@@ -128,6 +128,7 @@ def test_filters_with_a_memory(name):
     assert_close(jax.tree.leaves(got), jax.tree.leaves(wanted))
 
 
+@pytest.mark.usefixtures("compiled_as_users_do")
 def test_members_depend_on_neither_chunk_nor_order_nor_workers():
     """Blocks are the same program in any chunk of at least one block."""
     count = compiled.BLOCK + 100
@@ -149,6 +150,7 @@ def test_small_chunks_agree_but_for_the_last_bits():
         assert_allclose(got.cov, wanted.cov, rtol=0, atol=1e-13 * 1e4)
 
 
+@pytest.mark.usefixtures("compiled_as_users_do")
 @pytest.mark.parametrize("engine", ["numpy", "jax"])
 def test_a_member_that_fails_is_nan_alone(engine):
     count, bad = compiled.BLOCK + 3, compiled.BLOCK + 1
