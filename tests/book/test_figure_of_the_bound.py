@@ -96,6 +96,14 @@ def test_keys_and_pointer_move_the_noise_and_the_address_remembers(browser):
         assert not visit.errors
 
 
+def test_it_takes_the_place_of_its_picture(page):
+    assert page.locator("#fig-xiong-sensor").is_hidden()
+    page.emulate_media(media="print")
+    assert page.locator("#fig-xiong-sensor").is_visible()
+    assert page.locator("[data-figure=bound]").is_hidden()
+    page.emulate_media(media="screen")
+
+
 def test_it_is_drawn_at_thirty_frames_a_second(page):
     took = page.evaluate("""() => {
         const { figure } = document.querySelector('[data-figure=bound] .stage');

@@ -1,8 +1,10 @@
 """How a table is read: pairs, values chosen in hindsight, rows."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from html import escape
 from typing import NamedTuple
 
+from navfilters.book.printing import MARKS, compact
 from navfilters.problems.table import Cell
 
 HINDSIGHT = " *"
@@ -135,7 +137,7 @@ def reasons(found: Iterable[Cell]) -> dict[str, dict[str, list[str]]]:
 
 
 def listing(found: Sequence[Row]) -> str:
-    """The table as text, a paragraph for each row, for links and for readers of text.
+    """The table as one of HTML, for links, for readers of text and where nothing is computed.
 
     Parameters
     ----------
@@ -144,23 +146,25 @@ def listing(found: Sequence[Row]) -> str:
     Returns
     -------
     str
-        HTML; the paragraph of "B-EKF 1", say, has the id "cure-b-ekf-1".
+        The row of "B-EKF 1", say, has the id "cure-b-ekf-1"; in its cells stand error over the
+        reference and the mark of honesty.
     """
-    words = {-1: "cautious", 0: "honest", 1: "over-confident"}
-    paragraphs = []
-    for row in found:
-        pairs = [
-            f"{cell.problem}: {'cannot act' if cell.reason else _pair(cell, words[cell.honest])}"
-            for cell in row.cells
-        ]
-        paragraphs.append(
-            f'<p id="{anchor(row.label)}"><b>{row.label}</b> &#8212; {"; ".join(pairs)}.</p>'
-        )
-    return "\n".join(paragraphs)
+    heads = "".join(f'<th scope="col">{escape(cell.problem)}</th>' for cell in found[0].cells)
+    lines = [
+        f'<tr id="{anchor(row.label)}"><th scope="row">{escape(row.label)}</th>'
+        + "".join(f"<td>{_pair(cell)}</td>" for cell in row.cells)
+        + "</tr>"
+        for row in found
+    ]
+    return (
+        f'<table class="cures"><thead><tr><th scope="col">cure</th>{heads}</tr></thead>\n<tbody>'
+        + "\n".join(lines)
+        + "</tbody></table>"
+    )
 
 
 def anchor(label: str) -> str:
-    """The id of a row's paragraph.
+    """The id of a row.
 
     Parameters
     ----------
@@ -173,6 +177,7 @@ def anchor(label: str) -> str:
     return "cure-" + label.replace(HINDSIGHT, " best").lower().replace(" ", "-")
 
 
-def _pair(cell: Cell, word: str) -> str:
-    value = "" if cell.value is None else f" with {cell.value:g}"
-    return f"{cell.ratio:.2g} times the reference{value}, {word} ({cell.honesty:.2g})"
+def _pair(cell: Cell) -> str:
+    if cell.reason:
+        return "–"
+    return f"<span>{escape(compact(cell.ratio))}</span> {MARKS[cell.honest]}"
