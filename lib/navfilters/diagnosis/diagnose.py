@@ -1,6 +1,6 @@
 """Whether the innovations of one run are what the filter says that they are."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -205,7 +205,7 @@ def _whitened(y: Array, S: Array) -> tuple[Array, Array, Array, int]:
     return white, nis, dof, int(bad.sum())
 
 
-def _windows(time: Array, nis: Array, dof: Array, size: int, alpha: float):
+def _windows(time: Array, nis: Array, dof: Array, size: int, alpha: float) -> tuple[Array, Any]:
     """Ratio of every window beside its band, and the first time of the first one outside."""
     from scipy import stats
 
@@ -278,7 +278,7 @@ def _errors(log: Log, tail: float) -> dict[str, Any]:
     }
 
 
-def _findings(d: Diagnosis):
+def _findings(d: Diagnosis) -> Iterator[str]:
     if d.indefinite:
         yield f"S is not positive definite at {d.indefinite} updates"
     if not d.low <= d.ratio <= d.high:
