@@ -73,7 +73,7 @@ KEYWORDS = {
 """Old keywords of ``run`` and ``sweep``, and what does their work."""
 
 
-def refuse_old_keywords(function: str, given: dict) -> None:
+def refuse_old_keywords(function: str, given: dict[str, object]) -> None:
     """TypeError, saying the new name, for a keyword of version 0.1; or for one that never was."""
     for name in given:
         now = f"; since version 0.2 that is {KEYWORDS[name]}" if name in KEYWORDS else ""

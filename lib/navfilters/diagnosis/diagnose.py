@@ -1,6 +1,6 @@
 """Whether the innovations of one run are what the filter says that they are."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -213,7 +213,7 @@ def _errors(log: Log, tail: float) -> dict[str, Any]:
     }
 
 
-def _findings(d: Diagnosis):
+def _findings(d: Diagnosis) -> Iterator[str]:
     if d.indefinite:
         yield f"S is not positive definite at {d.indefinite} updates"
     if not d.low <= d.ratio <= d.high:

@@ -82,7 +82,7 @@ def as_filter(estimator: Any) -> Any:
     )
 
 
-def _takes_three(function: Callable) -> None:
+def _takes_three(function: Callable[..., Any]) -> None:
     """TypeError for a function that cannot be called as (prior, z, model)."""
     try:
         inspect.signature(function).bind(None, None, None)

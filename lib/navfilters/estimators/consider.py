@@ -26,7 +26,9 @@ class Consider:
         """The variant of update k, from 0."""
         return replace(self, variant=model_parts.at(self.variant, k))
 
-    def __call__(self, prior: Gaussian, model: MeasurementModel, moments: Moments):
+    def __call__(
+        self, prior: Gaussian, model: MeasurementModel, moments: Moments
+    ) -> tuple[Gaussian, Moments]:
         """The moments with rows of zeros in P_xz."""
         prior, moments = self.variant(prior, model, moments)
         xp, n = moments.P_xz.__array_namespace__(), moments.P_xz.shape[-2]

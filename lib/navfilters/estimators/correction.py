@@ -203,7 +203,9 @@ def recursive(
     root = semidefinite_root(prior.cov)[0]
     E = join([xp.zeros((*y.shape[:-1], H.shape[-1], H.shape[-2])), root], -1)
 
-    def part(mean: Array, E: Array, H: Array, R: Array, y: Array, left: Array):
+    def part(
+        mean: Array, E: Array, H: Array, R: Array, y: Array, left: Array
+    ) -> tuple[Array, Array]:
         N = semidefinite_root(R)[0]
         V = join([N, xp.zeros((*H.shape[:-2], *H.shape[-2:]))], -1) + matmul(H, E)
         K = right_divide(matmul(E, V.mT), matmul(V, V.mT)) / left

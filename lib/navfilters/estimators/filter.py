@@ -64,7 +64,9 @@ class Filter:
         if self.form not in FORMS:
             raise ValueError(f"form must be one of {list(FORMS)}; found {self.form!r}")
 
-    def __call__(self, prior: Gaussian, z: Array, model: MeasurementModel, **options) -> Gaussian:
+    def __call__(
+        self, prior: Gaussian, z: Array, model: MeasurementModel, **options: Any
+    ) -> Gaussian:
         """One update of every member, without rule and memory.
 
         Parameters
@@ -107,7 +109,7 @@ class Filter:
         """Names of the keywords that this filter takes."""
         return tuple(name for stage in STAGES for name in keywords(getattr(self, stage)))
 
-    def having(self, **options) -> "Filter":
+    def having(self, **options: Any) -> "Filter":
         """The same filter with these options.
 
         Parameters
@@ -132,7 +134,7 @@ class Filter:
                 stages[name] = partial(stage, **own)
         return replace(self, **stages)
 
-    def _know(self, options: dict) -> None:
+    def _know(self, options: dict[str, Any]) -> None:
         unknown = options and set(options) - set(self.options)
         if unknown:
             has = ", ".join(self.options) or "none"
@@ -268,7 +270,7 @@ class Filter:
         return self.update(state, z, sensor, k)
 
     def linear_limit(
-        self, prior: Gaussian, z: Array, model: MeasurementModel, **options
+        self, prior: Gaussian, z: Array, model: MeasurementModel, **options: Any
     ) -> Gaussian:
         """What this filter's first update must be on a linear model, by the textbook's filter.
 

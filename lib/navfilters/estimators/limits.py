@@ -43,7 +43,9 @@ LIMITS = {
 """Every variant of the library, with its limit: the Kalman filter of this P and R."""
 
 
-def textbook(variant: Any, options: dict, prior: Gaussian, z: Array, H: Array, R: Array):
+def textbook(
+    variant: Any, options: dict[str, Any], prior: Gaussian, z: Array, H: Array, R: Array
+) -> Gaussian:
     """The Kalman filter that a variant is, by LAPACK: no line of the filters takes part.
 
     Parameters

@@ -62,7 +62,9 @@ def hessian(model: MeasurementModel, x: Array) -> Array:
     return second_derivative(*by_error(model, model.h, x), "model.h")
 
 
-def by_error(model: Any, function: Callable, x: Array) -> tuple[Callable, Array]:
+def by_error(
+    model: Any, function: Callable[..., Array], x: Array
+) -> tuple[Callable[..., Array], Array]:
     """A function of the state as one of its error, and where that is none."""
     if not hasattr(model, "retract"):
         return function, x

@@ -1,6 +1,7 @@
 """How a filter predicts its state: the approximation of its moments, with f in the place of h."""
 
 from collections.abc import Callable
+from typing import Any
 
 from navfilters.estimators.model_parts import by_error, difference, moved, retract, transition
 from navfilters.estimators.moments import (
@@ -136,7 +137,11 @@ def predict_unscented(
 
 
 def in_parts(
-    predict: Callable[..., Gaussian], estimate: Gaussian, dynamics: Dynamics, Q: Array, **options
+    predict: Callable[..., Gaussian],
+    estimate: Gaussian,
+    dynamics: Dynamics,
+    Q: Array,
+    **options: Any,
 ) -> tuple[Gaussian, Array]:
     """A prediction, and what the noise added to its covariance.
 

@@ -14,7 +14,9 @@ from navfilters.types import Array, Gaussian, MeasurementModel, Moments
 Variant = Callable[..., tuple[Gaussian, Moments]]
 
 
-def unchanged(prior: Gaussian, model: MeasurementModel, moments: Moments):
+def unchanged(
+    prior: Gaussian, model: MeasurementModel, moments: Moments
+) -> tuple[Gaussian, Moments]:
     """The variant that changes nothing.
 
     Parameters
@@ -30,7 +32,9 @@ def unchanged(prior: Gaussian, model: MeasurementModel, moments: Moments):
     return prior, moments
 
 
-def bump_linear(prior: Gaussian, model: MeasurementModel, moments: Moments, *, bump: Array = 1.0):
+def bump_linear(
+    prior: Gaussian, model: MeasurementModel, moments: Moments, *, bump: Array = 1.0
+) -> tuple[Gaussian, Moments]:
     """R_new = R + bump * H P H^T: the noise grows by the linearised spread of the measurement.
 
     Parameters
@@ -93,14 +97,16 @@ class Underweighting:
             return partial(bump_linear, bump=xp.where(k < self.updates, self.bump, 0.0))
         return partial(bump_linear, bump=self.bump) if k < self.updates else unchanged
 
-    def __call__(self, prior: Gaussian, model: MeasurementModel, moments: Moments):
+    def __call__(
+        self, prior: Gaussian, model: MeasurementModel, moments: Moments
+    ) -> tuple[Gaussian, Moments]:
         """The first update's, for a single one."""
         return self.at(0)(prior, model, moments)
 
 
 def bump_predicted(
     prior: Gaussian, model: MeasurementModel, moments: Moments, *, bump: Array = 1.0
-):
+) -> tuple[Gaussian, Moments]:
     """R_new = R + bump * (P_zz - R): the noise grows by the spread of the filter's own prediction.
 
     Parameters
@@ -129,7 +135,9 @@ def bump_predicted(
     return prior, _add_noise(moments, _per_member(spread, bump) * spread)
 
 
-def bump_circular(prior: Gaussian, model: MeasurementModel, moments: Moments):
+def bump_circular(
+    prior: Gaussian, model: MeasurementModel, moments: Moments
+) -> tuple[Gaussian, Moments]:
     """R_new = R + norm(P) H H^T: as if the state were uncertain by its worst direction in all.
 
     Parameters
@@ -151,7 +159,9 @@ def bump_circular(prior: Gaussian, model: MeasurementModel, moments: Moments):
     return prior, _add_noise(moments, spectral_norm(prior.cov)[..., None, None] * matmul(H, H.mT))
 
 
-def bump_equivalent(prior: Gaussian, model: MeasurementModel, moments: Moments):
+def bump_equivalent(
+    prior: Gaussian, model: MeasurementModel, moments: Moments
+) -> tuple[Gaussian, Moments]:
     """R_new = norm(J R J^T) H H^T, J = H^-1: every sensor as coarse, in state space, as the worst.
 
     Parameters
@@ -188,7 +198,9 @@ def bump_equivalent(prior: Gaussian, model: MeasurementModel, moments: Moments):
     return prior, _add_noise(moments, R_new - R)
 
 
-def bump_state(prior: Gaussian, model: MeasurementModel, moments: Moments):
+def bump_state(
+    prior: Gaussian, model: MeasurementModel, moments: Moments
+) -> tuple[Gaussian, Moments]:
     """P_new = norm(P) I: forget every direction, keep the worst uncertainty.
 
     Parameters
@@ -216,7 +228,9 @@ def bump_state(prior: Gaussian, model: MeasurementModel, moments: Moments):
     return Gaussian(prior.mean, P_new), moments
 
 
-def expect_at_mean(prior: Gaussian, model: MeasurementModel, moments: Moments):
+def expect_at_mean(
+    prior: Gaussian, model: MeasurementModel, moments: Moments
+) -> tuple[Gaussian, Moments]:
     """z_hat = h(x): the residual is taken from the mean, the covariances from the sigma points.
 
     Parameters

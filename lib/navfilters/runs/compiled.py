@@ -79,7 +79,7 @@ class _Once:
 
 
 @lru_cache(maxsize=64)
-def _program(key: tuple, shapes: tuple) -> Any:
+def _program(key: tuple[Any, ...], shapes: tuple[Any, ...]) -> Any:
     """The executable of a job for arrays of these shapes."""
     tree, axes, steps, z_per_step, complete = key
     if isinstance(tree, _Once):
@@ -103,7 +103,7 @@ def _in_blocks(job: Job, arrays: list[jax.Array]) -> Kept:
         for array, axis in zip(arrays, job.axes, strict=True)
     ]
 
-    def block(mine: list) -> Kept:
+    def block(mine: list[Any]) -> Kept:
         return _scan(job, [a if m is None else m for a, m in zip(arrays, mine, strict=True)])
 
     kept = jax.lax.map(block, split)
@@ -150,7 +150,7 @@ def _scan(job: Job, arrays: list[jax.Array]) -> Kept:
         numbers = jnp.arange(first, last)
         series = (numbers, march.z[first:last] if job.z_per_step else None)
 
-        def step(state, now):
+        def step(state: Any, now: Any) -> tuple[Any, Any]:
             k, z = now
             state, row = march.advance(state, k, z if job.z_per_step else march.z)
             return carried(state), row

@@ -131,7 +131,7 @@ def measurements(
     return z, validation.batch(**shapes)
 
 
-def _fits(z, prior: Gaussian, model: MeasurementModel, axes: str, name: str) -> None:
+def _fits(z: Any, prior: Gaussian, model: MeasurementModel, axes: str, name: str) -> None:
     """Whether a measurement, and a state, are the model's."""
     m = measured_size(model, prior)
     if z.shape[-1] != m:
@@ -237,8 +237,8 @@ def dynamics(model: Any, prior: Gaussian) -> None:
     Q = validation.covariance("dynamics.Q", model.Q, size, definite=False)
     own = Q.shape[:-2]
 
-    def part(name: str, i: int, count: int) -> Callable:
-        def of_tuple(x):
+    def part(name: str, i: int, count: int) -> Callable[[Any], Any]:
+        def of_tuple(x: Any) -> Any:
             found = getattr(model, name)(*((x, Q) if name == "propagate" else (x,)))
             if not (isinstance(found, tuple) and len(found) == count):
                 needed = "(f(x), F)" if count == 2 else "(f(x), F, W)"

@@ -26,7 +26,7 @@ WORTH_A_PROCESS = 1e7
 SEVERAL = 3
 """Configurations that stand for a batch when the model's functions are looked at."""
 
-SOUND: set[tuple] = set()
+SOUND: set[tuple[Any, ...]] = set()
 """Structures and shapes of problems whose models were called and found sound: once is enough."""
 
 SENT = 2**26
@@ -52,7 +52,17 @@ class Problem:
     batch: tuple[int, ...]
 
     @classmethod
-    def of(cls, estimator, priors, z, model, dynamics, record, steps, z_per_step) -> "Problem":
+    def of(
+        cls,
+        estimator: Any,
+        priors: Gaussian,
+        z: Any,
+        model: Any,
+        dynamics: Any,
+        record: Any,
+        steps: int,
+        z_per_step: bool,
+    ) -> "Problem":
         """The arguments of a sweep, checked; ValueError names the one that is wrong."""
         priors = model_checks.start("priors", priors, model, dynamics)
         z, _ = model_checks.measurements(z, priors, model, steps, z_per_step, "priors")

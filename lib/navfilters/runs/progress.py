@@ -4,9 +4,10 @@ import importlib
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 
-def progress(updates: Iterable) -> Iterator:
+def progress(updates: Iterable[Any]) -> Iterator[Any]:
     """An iterable, reported on as it is used.
 
     Parameters

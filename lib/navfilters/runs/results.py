@@ -1,5 +1,7 @@
 """What a sweep keeps, filled in chunk by chunk: never with less than was asked for."""
 
+from typing import Any
+
 import numpy as np
 
 from navfilters.runs.chunks import SweepError
@@ -72,7 +74,7 @@ class Results:
         return unflatten(self.tree, shaped)
 
 
-def _shown(kept: dict[str, tuple]) -> str:
+def _shown(kept: dict[str, tuple[Any, ...]]) -> str:
     return ", ".join(
         f"{name.removeprefix('kept.')} {shape} {dtype}" for name, (shape, dtype) in kept.items()
     )

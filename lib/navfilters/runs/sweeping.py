@@ -13,6 +13,7 @@ from typing import Any, Literal
 from uuid import uuid4
 
 from navfilters._moved import refuse_old_keywords
+from navfilters.estimators import model_parts
 from navfilters.estimators.any_filter import as_filter
 from navfilters.estimators.filter import Filter
 from navfilters.numerics import validation
@@ -164,7 +165,7 @@ def sweep(
     problem = Problem.of(estimator, priors, z, model, dynamics, record, steps, z_per_step)
     if steps and isinstance(estimator, Filter):
         model_checks.measures(model)
-    complete = problem.complete and not hasattr(model_checks.at(model, 0), "given")
+    complete = problem.complete and not hasattr(model_parts.at(model, 0), "given")
     shared = problem.tree, problem.axes, problem.grid, steps, z_per_step, complete
     job = Job(engine, *shared, uuid4().hex)
     results = Results(_probe(job, problem), problem.count, steps)
@@ -195,7 +196,9 @@ def _doubles(engine: str) -> Any:
     return needed("jax", "navfilters[jax]", 'engine="jax"').enable_x64(True)
 
 
-def _place(job: Job, problem: Problem, client: Any, workers: int | None) -> Callable[..., Iterator]:
+def _place(
+    job: Job, problem: Problem, client: Any, workers: int | None
+) -> Callable[..., Iterator[Any]]:
     """Where the chunks are computed."""
     if client is not None:
         return partial(places.on_cluster, client=client)
@@ -248,7 +251,15 @@ def _bar(total: int, progress: bool | Callable[[int], Any]) -> Any:
     return tqdm(total=total, unit=" configurations", disable=hidden)
 
 
-def _fill(results, job, problem, size, store, place, progress) -> None:
+def _fill(
+    results: Results,
+    job: Job,
+    problem: Problem,
+    size: int,
+    store: Checkpoint | None,
+    place: Callable[..., Any],
+    progress: bool | Callable[[int], Any],
+) -> None:
     """Load the chunks that are stored and compute the others."""
     with _bar(problem.count, progress) as bar:
         missing = []

@@ -15,12 +15,12 @@ PATIENCE = 30.0
 """Seconds for which a sweep waits for the first worker of a cluster."""
 
 
-def in_turn(call: Call, tasks: Iterator) -> Iterator:
+def in_turn(call: Call, tasks: Iterator[Any]) -> Iterator[Any]:
     """One after the other, in this process."""
     yield from map(call, tasks)
 
 
-def on_cores(call: Call, tasks: Iterator, workers: int, *, threads: bool) -> Iterator:
+def on_cores(call: Call, tasks: Iterator[Any], workers: int, *, threads: bool) -> Iterator[Any]:
     """In so many processes or threads; a few tasks at a time are taken from the iterator."""
     joblib = needed("joblib", "navfilters[sweep]", "a sweep with workers")
     options: dict[str, Any] = {"backend": "threading"}
@@ -35,7 +35,7 @@ def _leave_ctrl_c_to_parent() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def on_cluster(call: Call, tasks: Iterator, client: Any) -> Iterator:
+def on_cluster(call: Call, tasks: Iterator[Any], client: Any) -> Iterator[Any]:
     """On a dask cluster. What a lost worker had is computed again by another.
 
     Where there is no worker yet, this says so and waits, with one task submitted: a cluster that
@@ -44,7 +44,7 @@ def on_cluster(call: Call, tasks: Iterator, client: Any) -> Iterator:
     dask = needed("dask", "navfilters[cluster]", "a sweep on a cluster")
     as_completed = needed("distributed", "navfilters[cluster]", "a sweep on a cluster").as_completed
 
-    def submit(task):
+    def submit(task: Any) -> Any:
         # A task carries its own configurations, so that no worker's loss takes them along.
         with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1GB"}):
             return client.submit(call, task, pure=False)

@@ -126,7 +126,7 @@ class EarthFixedNavigation:
         parts = to_end(lambda _, part: self.orbit.transitions(part)[..., :6, :6], path, 6)
         return path[-1], list(parts)
 
-    def _step(self, k: Array, x: Array) -> tuple[Array, Callable]:
+    def _step(self, k: Array, x: Array) -> tuple[Array, Callable[..., Array]]:
         """Position and velocity a step later, and M -> F M, for JAX."""
         orbit, xp = self.orbit, x.__array_namespace__()
         x_next, turn = orbit.advance(x), orbit.rate * xp.asarray(TURN)

@@ -274,7 +274,7 @@ class Orbit:
         """f(x), F and, given Q, W, for JAX."""
         pushes = self._pushes(self.start, self.substeps, x)
 
-        def sub_step(k: Array, x: Array) -> tuple[Array, Callable]:
+        def sub_step(k: Array, x: Array) -> tuple[Array, Callable[..., Array]]:
             x_next, at, order = self._advance(pushes, k, x), x, 1
             if self.integrator == "rk4":
                 at, order = middle(x, x_next, self.step), 3
@@ -288,7 +288,7 @@ class Orbit:
 POSITION, VELOCITY = np.eye(6)[:3], np.eye(6)[3:]  # r = POSITION @ x; constants, not concat: faster
 
 
-def _euler(derivative, x: Array, h: float) -> Array:
+def _euler(derivative: Callable[[Array], Array], x: Array, h: float) -> Array:
     return x + h * derivative(x)  # Eq. (35)
 
 

@@ -91,7 +91,7 @@ def forwards(
     F = xp.zeros_like(x[..., :1])[..., None] + xp.eye(n)
     W = () if Q is None else (xp.zeros_like(F + Q),)
 
-    def advance(k: Array, carry: tuple) -> tuple:
+    def advance(k: Array, carry: tuple[Array, ...]) -> tuple[Array, ...]:
         x, F, *W = carry
         x, grow = step(k, x)
         return x, grow(F), *(grow(grow(w).mT) + Q for w in W)

@@ -202,7 +202,13 @@ def zeros(x: Array, covariance: Array) -> Array:
     return x.__array_namespace__().zeros(covariance.shape[-1])
 
 
-def _second(function: Callable, jacobian: Callable | None, x: Array, rest: tuple, name: str) -> Any:
+def _second(
+    function: Callable[..., Array],
+    jacobian: Callable[..., Array] | None,
+    x: Array,
+    rest: tuple[Any, ...],
+    name: str,
+) -> Any:
     """Second derivatives in x, of a function or of its Jacobian."""
     if jacobian is None:
         return second_derivative(lambda y: function(y, *rest), x, name)
