@@ -22,7 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 if it passed, 1 if it failed.
+        0 if it passed, 1 if it failed or was interrupted.
     """
     parser = argparse.ArgumentParser(
         prog="navfilters crash-test",
@@ -34,12 +34,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--suite", default="quick", choices=SUITES)
     parser.add_argument("--check", action="append", choices=CHECKS, help="only this; repeatable")
+    parser.add_argument(
+        "--workers", type=int, help="processes for a filter of one state; one per core by default"
+    )
     parser.add_argument("--html", type=Path, help="write a page to this file")
     parser.add_argument("--json", type=Path, help="write the numbers to this file")
     chosen = parser.parse_args(arguments)
     try:
         filter = imported(chosen.filter)
-        report = crash_test(filter, chosen.check or chosen.suite, name=chosen.filter)
+        asked = chosen.check or chosen.suite
+        report = crash_test(filter, asked, name=chosen.filter, workers=chosen.workers)
     except (ValueError, TypeError) as error:
         parser.error(str(error))
     report = replace(report, where=chosen.filter)

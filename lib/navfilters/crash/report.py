@@ -107,7 +107,8 @@ class Report:
 
     def _count(self) -> str:
         made = [f for f in self.findings if f.passed is not None]
-        return f"{sum(bool(f.passed) for f in made)} of {len(made)} checks passed"
+        stopped = ", then interrupted" if self.missing else ""
+        return f"{sum(bool(f.passed) for f in made)} of {len(made)} checks passed{stopped}"
 
     def _explained(self, finding: Finding) -> list[str]:
         c = finding.check
