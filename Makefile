@@ -6,7 +6,8 @@ BIN := $(VENV)/bin
 BUILT := _build/.complete
 BENCH := .venv-bench
 SOURCES := $(shell find book lib -type f -not -path '*/__pycache__/*' -not -name '.*' -not -path '*/thumbnails/*' 2>/dev/null) \
-	_config.yml _toc.yml requirements.txt tools/execute_notebooks.py tools/executed.py tools/thumbnails.py tools/downloads.py
+	_config.yml _toc.yml requirements.txt tools/execute_notebooks.py tools/executed.py tools/thumbnails.py \
+	tools/book_pages.py tools/icons.js tools/search-order.js tools/downloads.py
 
 # Everything runs in .venv, with .venv's settings: what the shell has of packages (ROS sets PYTHONPATH),
 # start-up files, kernels named python3, styles and pip options stays outside.

@@ -1,0 +1,75 @@
+"""What the book's pages get beyond the theme's."""
+
+from typing import NamedTuple
+
+import book_pages
+import numpy as np
+import pytest
+from PIL import Image
+
+
+class Pair(NamedTuple):
+    left: int
+    right: int
+
+
+def test_fields_of_named_tuples_are_left_out():
+    assert book_pages.without_description(None, "class", "left", Pair.left, False, None) is True
+    assert book_pages.without_description(None, "class", "count", Pair.count, False, None) is None
+
+
+@pytest.mark.parametrize(
+    ("label", "numbers"),
+    [
+        ("perea2007-10-to-12", "perea2007 (10)–(12)"),
+        ("xiong2009-27-47", "xiong2009 (27), (47)"),
+        ("xiong2009-a14", "xiong2009 (A.14)"),
+    ],
+)
+def test_an_equation_has_our_number_and_the_sources(tmp_path, label, numbers):
+    page = tmp_path / "page.html"
+    page.write_text(f'<div class="math" id="equation-{label}">\n<span class="eqno">(3)<a></a>')
+    book_pages.mend(page)
+    assert f'<span class="eqno-source">{numbers}</span> (3)<a>' in page.read_text()
+
+
+def test_an_equation_of_ours_has_one_number(tmp_path):
+    page = tmp_path / "page.html"
+    text = '<div class="math" id="equation-joseph">\n<span class="eqno">(3)<a></a>'
+    page.write_text(text)
+    book_pages.mend(page)
+    assert page.read_text() == text
+
+
+@pytest.mark.parametrize(("name", "kept"), [("search.html", True), ("page.html", False)])
+def test_the_index_of_the_search_is_for_the_search(tmp_path, name, kept):
+    page = tmp_path / name
+    page.write_text(
+        '<script src="../_static/searchtools.js"></script>\n'
+        '<script src="../searchindex.js"></script>'
+    )
+    book_pages.mend(page)
+    assert ("searchindex" in page.read_text()) is kept
+    assert ("searchtools" in page.read_text()) is kept
+
+
+def test_a_picture_of_few_colours_becomes_smaller_and_looks_the_same(tmp_path):
+    colours = np.random.default_rng(3).integers(0, 256, (40, 3), dtype=np.uint8)
+    pixels = colours[np.random.default_rng(4).integers(0, 40, (120, 160))]
+    path = tmp_path / "few.png"
+    Image.fromarray(pixels).save(path)
+    size = path.stat().st_size
+    book_pages.with_palette(path)
+    assert path.stat().st_size < size
+    moved = np.asarray(Image.open(path).convert("RGB"), int) - pixels
+    assert np.abs(moved).max() <= book_pages.NEAR
+
+
+def test_a_picture_of_many_colours_or_a_clear_one_stays(tmp_path):
+    pixels = np.random.default_rng(5).integers(0, 256, (120, 160, 4), dtype=np.uint8)
+    for name, made in (("many", pixels[..., :3]), ("clear", pixels)):
+        path = tmp_path / f"{name}.png"
+        Image.fromarray(made).save(path)
+        before = path.read_bytes()
+        book_pages.with_palette(path)
+        assert path.read_bytes() == before
