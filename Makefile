@@ -57,10 +57,10 @@ $(BUILT): $(SOURCES) $(VENV)/.book
 test: lint coverage nbval elsewhere pages  ## everything: lint, types, unit tests, notebooks, rendered pages
 
 unit: $(VENV)/.test  ## unit and property tests alone, without the slow ones, in about a minute
-	$(BIN)/pytest tests --ignore tests/book -n 2 -m "not slow"
+	$(BIN)/pytest tests --ignore tests/book -n 2 --dist worksteal -m "not slow"
 
 coverage: $(VENV)/.test  ## all unit tests, with branch coverage
-	$(BIN)/pytest tests --ignore tests/book -n 2 --cov --cov-report=term
+	$(BIN)/pytest tests --ignore tests/book -n 2 --dist worksteal --cov --cov-report=term
 
 lint: $(VENV)/.test  ## ruff over code and notebooks, mypy and the layers of imports over the library
 	$(BIN)/ruff check .

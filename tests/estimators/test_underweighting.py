@@ -67,7 +67,6 @@ def test_the_variant_of_each_update():
         assert_allclose(traced, held.at(k)(prior, model, moments)[1].P_zz, rtol=1e-14)
 
 
-@pytest.mark.slow
 def test_both_engines_agree():
     prior, z, model = problem()
     held = Filter(variant=Underweighting(np.array([0.0, 0.2, 3.0]), 2))

@@ -58,7 +58,6 @@ def acquired():
     return acquire(CASES["TC-1"], 1, SMALL)
 
 
-@pytest.mark.slow
 def test_the_criteria_see_the_truth_and_the_matches_find_it(acquired):
     offset = np.array([-60.0, -30.0, 0.0, 30.0, 60.0])
     curves = block_curves(acquired, offset, 512, 256)
@@ -74,7 +73,6 @@ def test_the_criteria_see_the_truth_and_the_matches_find_it(acquired):
     assert tables[0].climb(acquired.speed + 40, (20.0, 5.0)).ended == "peak"
 
 
-@pytest.mark.slow
 def test_other_terrain_is_other_ground(acquired):
     moved = acquire(CASES["TC-1"], 1, replace(SMALL, moved=(0.02, -0.01)))
     east, north = np.meshgrid(np.linspace(-500, 500, 5), np.linspace(-500, 500, 5))

@@ -161,7 +161,6 @@ def test_the_table_has_a_line_for_each_and_its_numbers():
     assert lines[3].split()[4:8] == ["-", "-", "100%", "100%"]
 
 
-@pytest.mark.slow
 def test_the_command_prints_every_table(capsys):
     command.main(["--noise", "2"])
     out = capsys.readouterr().out

@@ -99,7 +99,6 @@ def test_an_offset_without_uncertainty_changes_nothing():
     assert not P[..., 9:].any()
 
 
-@pytest.mark.slow
 def test_a_delay_is_paid_for_by_its_state_considered_or_estimated():
     late, sigma = [Trial("antenna", delay=3.0)], {"delay": 3.0}
     told = fly_with_offsets(SETUP, late, sigma, runs=40)
@@ -121,7 +120,6 @@ def test_bad_input():
         fly_with_offsets(SETUP, [Trial()], {"height": 1.0})
 
 
-@pytest.mark.slow
 def test_the_table_names_every_trial():
     lines = antenna_table("TC-2", 2).splitlines()
     assert len(lines) == 38 + 1

@@ -76,7 +76,6 @@ def test_an_innovation_before_the_first_step_is_nan(engine):
     assert_allclose(got, run(FILTERS["EKF"], prior, z, sensor, **go), rtol=1e-9)
 
 
-@pytest.mark.slow
 def test_records_come_from_other_processes_too():
     prior, z, sensor, dynamics, _ = moving()
     go = partial(quiet, ALL["EKF, adaptive robust"], prior, z, sensor, dynamics=dynamics)

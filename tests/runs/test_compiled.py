@@ -12,8 +12,6 @@ from polar_models import POLAR, PRIORS, AsClass, AsNamedTuple, R, Z, in_closures
 
 from navfilters import FILTERS, run
 
-pytestmark = pytest.mark.slow
-
 
 def test_a_model_that_was_changed_is_compiled_anew():
     """As an attribute, in place, in a closure, and in a dictionary: not the program of before."""

@@ -121,7 +121,6 @@ def test_a_single_configuration_of_a_named_tuple(engine):
     assert_allclose(got, run(FILTERS["UKF"], prior, Z, AsNamedTuple(R), 3).mean[-1], rtol=1e-12)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("write", WRITTEN, ids=lambda w: w.__name__)
 def test_other_processes_take_them_too(write):
     got = quiet(FILTERS["EKF"], PRIORS, Z, write(MANY), 3, workers=2, chunk=2).final.mean

@@ -100,7 +100,6 @@ def test_a_map_of_no_place_on_earth_is_refused(tmp_path):
         read_terrain(path, LocalMap(-17.0, 95.0), 2000.0)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("void", [-9999.0])
 def test_a_void_of_one_fine_pixel_is_not_averaged_away(tmp_path, void):
     """Of 3 m posts, twelve make one that is read: the average with the void would be a height."""

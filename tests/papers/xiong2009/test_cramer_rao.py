@@ -8,8 +8,6 @@ from numpy.testing import assert_allclose
 
 from navfilters.papers.xiong2009 import Setup, cramer_rao_bound, root_mean_square, truth
 
-pytestmark = pytest.mark.slow
-
 SHORT = Setup(duration=2000, window=500, burns=((700, 900),), thrust=0.45)
 
 

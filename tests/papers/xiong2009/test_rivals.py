@@ -71,7 +71,6 @@ def test_told_rivals_follow_the_arcs_that_they_are_told():
     assert right.rms(slice(7, 21))[0, 0] < 0.5 * wrong.rms(slice(7, 21))[0, 0]
 
 
-@pytest.mark.slow
 def test_an_oracle_without_random_numbers_expects_the_same():
     """RMS and NEES of a timed filter through the whole flight, 40 runs."""
     A = Setup()
@@ -149,7 +148,6 @@ def test_two_models_that_are_one_are_that_one():
     assert_allclose(flights.states[:, 0] - twice, flown.error[:, 0, 0], rtol=1e-6, atol=1e-5)
 
 
-@pytest.mark.slow
 def test_an_imm_written_apart_flies_the_same():
     """Metres apart at the end; in the burns the probabilities magnify small differences."""
     A = Setup()

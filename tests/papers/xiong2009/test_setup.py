@@ -20,8 +20,6 @@ from navfilters.papers.xiong2009 import (
 )
 from navfilters.space import EARTH, Orbit, perigee_apogee
 
-pytestmark = pytest.mark.slow
-
 SHORT = Setup(duration=2000, window=500, burns=((700, 900),), thrust=0.45)
 
 
