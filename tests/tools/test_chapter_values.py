@@ -9,7 +9,7 @@ from browser import ROOT
 
 SHOWS = {
     "last": "from navfilters.book import table\ntable([('EKF', 0.125)], 'xy', caption='Errors')",
-    "displayed": "from IPython.display import display\ndisplay(table([(1, 2)], 'xy', caption='c'))",
+    "displayed": "display(table([(1, 2)], 'xy', caption='c'))",
     "printed": "print('three')",
 }
 
