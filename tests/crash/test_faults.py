@@ -4,7 +4,8 @@ import pytest
 
 from navfilters import FILTERS
 from navfilters.crash import SUITES, crash_test, from_filterpy
-from navfilters.crash.planted import FAULTS, ekf
+from navfilters.crash.planted import FAULTS
+from navfilters.crash.planted import textbook_ekf as ekf
 
 
 @pytest.mark.parametrize("fault", FAULTS)

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from navfilters import FILTERS
 from navfilters.crash import CHECKS, crash_test, from_filterpy, from_functions
 from navfilters.crash.comparison import champion, course, nis_of
-from navfilters.crash.planted import ekf
+from navfilters.crash.planted import textbook_ekf as ekf
 from navfilters.problems import problems
 from navfilters.problems.outcome import follow, treat
 from navfilters.runs import nees

@@ -10,7 +10,7 @@ from navfilters import FILTERS
 from navfilters.__main__ import main as navfilters
 from navfilters.crash import CHECKS, Case, crash_test, from_filterpy, from_functions
 from navfilters.crash import suite as suites
-from navfilters.crash.planted import ekf
+from navfilters.crash.planted import textbook_ekf as ekf
 
 pytest_plugins = ["navfilters.crash.pytest_plugin"]
 
@@ -116,7 +116,7 @@ def test_bad_input_is_refused(call, message):
 
 
 MINE = """
-from navfilters.crash.planted import ekf
+from navfilters.crash.planted import textbook_ekf as ekf
 right, wrong = ekf(), ekf("no wrap")
 """
 

@@ -7,7 +7,7 @@ import pytest
 
 from navfilters import FILTERS
 from navfilters.crash import CHECKS, SUITES, crash_test, from_functions
-from navfilters.crash.planted import ekf
+from navfilters.crash.planted import textbook_ekf as ekf
 from navfilters.crash.subject import Subject
 from navfilters.crash.suite import updates
 from navfilters.problems import static_fix

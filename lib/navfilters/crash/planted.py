@@ -17,7 +17,7 @@ def _seen(z: Array, model: Any) -> tuple[Array, Array, Array]:
     return kept, z[kept], model.R[np.ix_(kept, kept)]
 
 
-def ekf(fault: str = "") -> Adapted:
+def textbook_ekf(fault: str = "") -> Adapted:
     """An extended Kalman filter in Joseph's form.
 
     Parameters
@@ -117,7 +117,7 @@ def remembering() -> Adapted:
     -------
     Adapted
     """
-    right, last = ekf(), [0.0]
+    right, last = textbook_ekf(), [0.0]
 
     def update(x: Array, P: Array, z: Array, model: Any) -> tuple[Array, ...]:
         x, P = right.update(x, P, z, model)
@@ -132,7 +132,7 @@ FAULTS: dict[str, tuple[Callable[[], Adapted], str]] = {
     "stale sigma points": (stale_ukf, "motion"),
     "state leaks between members": (remembering, "members"),
 } | {
-    fault: (partial(ekf, fault), check)
+    fault: (partial(textbook_ekf, fault), check)
     for fault, check in (
         ("sign of a Jacobian", "linear"),
         ("R squared", "linear"),
