@@ -47,6 +47,17 @@ class Ranges(NamedTuple):
         return xp.stack([((x - xp.asarray(b)) ** 2).sum(-1) for b in self.beacons], -1)
 
 
+class Circling:
+    """A motion: f and Q, no derivative; it turns and is braked by its distance."""
+
+    Q = 0.1 * np.eye(2)
+
+    def f(self, x):
+        xp = x.__array_namespace__()
+        slow = 0.1 * xp.exp(-(x**2).sum(-1, keepdims=True) / 5000)
+        return x + slow * xp.stack([-x[..., 1], x[..., 0]], -1)
+
+
 MODEL = Ranges(25.0 * np.eye(3))
 NEW = {
     "a function": cautious,
@@ -76,6 +87,26 @@ def test_run_sweep_and_consistency(name, engine):
     each = nees(truth - got.final.mean, got.final.cov)
     assert each.shape == (200,)
     assert 0.5 < each.mean() < 2.5  # they believe a little less than they know
+
+
+@engines
+@pytest.mark.parametrize("name", ["EKF", "mtSOF", "UKF"])
+def test_a_motion_without_derivatives(name, engine):
+    """With the reader's sensor; the Jacobian of f is central differences'."""
+    _, prior, z = runs(20)
+    wanted = run(FILTERS[name], prior, z, MODEL, dynamics=Circling(), z_per_step=True)
+    got = sweep(
+        FILTERS[name], prior, z, MODEL, dynamics=Circling(), z_per_step=True, progress=False,
+        engine=engine,
+    )  # fmt: skip
+    assert_allclose(got.final.mean, wanted.mean[-1], rtol=1e-10)
+    x, P = prior.mean[0], prior.cov
+    ekf = FILTERS["EKF"]
+    f, h = Circling().f, 1e-5
+    F = np.stack([(f(x + h * e) - f(x - h * e)) / (2 * h) for e in np.eye(2)], -1)
+    predicted = ekf.predict(ekf.init(Gaussian(x, P)), Circling()).estimate
+    assert_allclose(predicted.mean, f(x))
+    assert_allclose(predicted.cov, F @ P @ F.T + Circling.Q, atol=1e-8)  # of differences
 
 
 def test_a_rule_declares_its_linear_limit():

@@ -54,7 +54,7 @@ def watch(root: Path, build: Callable[[], object], pause: float, rounds: int | N
 
 
 def build() -> None:
-    """``make book``, which says what is wrong; the last good pages stay."""
+    """``make book``, which says what is wrong."""
     subprocess.run(["make", "--silent", "book", f"PYTHON={sys.executable}"], cwd=ROOT, check=False)
 
 
