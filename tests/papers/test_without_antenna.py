@@ -120,6 +120,7 @@ def test_bad_input():
         fly_with_offsets(SETUP, [Trial()], {"height": 1.0})
 
 
+@pytest.mark.slow
 def test_the_table_names_every_trial():
     lines = antenna_table("TC-2", 2).splitlines()
     assert len(lines) == 38 + 1
