@@ -137,9 +137,9 @@ def test_it_takes_the_place_of_its_pictures(page):
 
 def test_a_link_to_its_picture_leads_to_it(browser):
     with browser.visit(CHAPTER) as visit:
-        page = visit.page
-        page.goto(f"{page.url}#fig-every-cure")
-        page.reload()
+        page, address = visit.page, visit.page.url
+        page.goto("about:blank")
+        page.goto(f"{address}#fig-every-cure")
         at_work(page, "cures")
         page.wait_for_function("""() => {
             const box = document.querySelector('[data-figure=cures]').getBoundingClientRect();
