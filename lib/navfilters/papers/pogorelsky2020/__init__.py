@@ -80,7 +80,6 @@ from navfilters.papers.pogorelsky2020.own_store import read_own, write_own
 from navfilters.papers.pogorelsky2020.pixel_errors import (
     image_axes,
     pixel_covariance,
-    stretch,
     terrain_normal,
 )
 from navfilters.papers.pogorelsky2020.real_flight import (
@@ -199,7 +198,6 @@ __all__ = [
     "run_filter",
     "same_images",
     "simulate_images",
-    "stretch",
     "summary",
     "sweep_speed",
     "tabulate",

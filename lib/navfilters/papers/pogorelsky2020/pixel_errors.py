@@ -59,8 +59,8 @@ def pixel_covariance(axes: Array, sigma: Array) -> Array:
 
     D = A^-1 diag(sigma^2) A^-T
 
-    The closer the slope is to facing the radar, the longer D is along it: without bound where it
-    does.
+    On a slope alpha that faces a radar of incidence theta, D has a deviation of
+    sigma_1 / sin(theta - alpha) up the slope: without bound where the two are equal.
 
     Parameters
     ----------
@@ -84,25 +84,3 @@ def pixel_covariance(axes: Array, sigma: Array) -> Array:
         raise ValueError(f"sigma must be three numbers of at least 0; found {sigma}")
     spread = np.linalg.inv(axes) * sigma
     return spread @ spread.mT
-
-
-def stretch(axes: Array, level: Array) -> Array:
-    """By how much an error in distance displaces a pixel on a slope more than on level ground.
-
-    Parameters
-    ----------
-    axes : array (..., 3, 3)
-        Of the slope, see ``image_axes``.
-    level : array (..., 3, 3)
-        The same with the vertical for its normal.
-
-    Returns
-    -------
-    array (...)
-        Horizontally, across the flight. Below one where the slope turns away, negative where it is
-        laid over.
-    """
-    up = level[..., 2, :]
-    across = np.cross(level[..., 1, :], up)
-    moved = [np.sum(across * np.linalg.inv(rows)[..., :, 0], axis=-1) for rows in (axes, level)]
-    return moved[0] / moved[1]
