@@ -68,12 +68,13 @@ def fresh(
         if not scanned:
             raise ValueError(f"patients must have scanned values in the table; found {name!r}")
         chosen = min(scanned, key=lambda cell: cell.ratio)
-        cure = replace(by_name[chosen.cure], value=chosen.value)
+        value = float(chosen.value or 0.0)
+        cure = replace(by_name[chosen.cure], value=value)
         rows.append(
             Fresh(
                 name,
                 chosen.cure,
-                chosen.value,
+                value,
                 chosen.ratio / first[name, PLAIN].ratio,
                 tuple(
                     _error(problem, cure, runs, seed) / _error(problem, by_name[PLAIN], runs, seed)

@@ -132,7 +132,9 @@ def own_tables(runs: int, imaging: Imaging = WHOLE, *, progress: Callable = bar)
     OwnImages
     """
     validation.whole_number("runs", runs, 1)
-    variance, entropy, normal = ([[] for _ in range(UPDATES)] for _ in range(3))
+    variance: list[list[ImageTable]] = [[] for _ in range(UPDATES)]
+    entropy: list[list[ImageTable]] = [[] for _ in range(UPDATES)]
+    normal: list[list[Array]] = [[] for _ in range(UPDATES)]
     with progress(runs * UPDATES) as done:
         for k in range(1, UPDATES + 1):
             for run in range(runs):
@@ -143,8 +145,9 @@ def own_tables(runs: int, imaging: Imaging = WHOLE, *, progress: Callable = bar)
                 (by_variance,) = block_tables(*sighting, "variance")
                 variance[k - 1].append(by_variance)
                 entropy[k - 1] += block_tables(*sighting, "entropy")
-                place = ecef_to_geodetic(by_variance.r_f[0])[:2]
-                normal[k - 1].append(terrain_normal(sighting.acquired.scene.terrain, *place))
+                latitude, longitude, _ = (float(a) for a in ecef_to_geodetic(by_variance.r_f[0]))
+                terrain = sighting.acquired.scene.terrain
+                normal[k - 1].append(terrain_normal(terrain, latitude, longitude))
                 done(1)
     return OwnImages(variance, entropy, np.array(normal))
 
