@@ -1,5 +1,6 @@
 """Blocks of an image, and loops whose runs have images of their own."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +22,9 @@ from navfilters.papers.pogorelsky2020 import (
     fly_own_images,
     match_blocks,
     monte_carlo,
+    own_images,
     own_report,
+    own_tables,
     read_own,
     truth,
     write_own,
@@ -166,3 +169,17 @@ def test_stored_sets_come_back(tmp_path):
     assert again.variance[0][0].climb(7400.0, (4.0,)) == found.variance[0][0].climb(7400.0, (4.0,))
     with pytest.raises(ValueError, match="found none"):
         read_own(tmp_path / "other.npz")
+
+
+@pytest.mark.slow
+def test_the_stored_sets_are_what_the_library_computes(monkeypatch):
+    """The first image of the first run, without the other two."""
+    monkeypatch.setattr(own_images, "UPDATES", 1)
+    (made,), kept = (
+        own_tables(1, progress=lambda work: nullcontext(lambda done: None))[0],
+        read_own(),
+    )
+    stored = kept.variance[0][0]
+    assert_allclose(made[0].r_f, stored.r_f, atol=0.1)
+    assert_allclose(made[0].sharpness, stored.sharpness, rtol=1e-3)
+    assert kept.normal.shape == (3, len(kept.variance[0]), 3)
