@@ -1,5 +1,6 @@
 """Blocks of an image, and loops whose runs have images of their own."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from navfilters.papers.pogorelsky2020 import (
     Images,
     ImageTable,
     Imaging,
+    OwnImages,
     acquire,
     block_curves,
     block_tables,
@@ -20,10 +22,13 @@ from navfilters.papers.pogorelsky2020 import (
     fly_own_images,
     match_blocks,
     monte_carlo,
+    own_images,
     own_report,
+    own_tables,
+    read_own,
     truth,
+    write_own,
 )
-from navfilters.papers.pogorelsky2020 import own_images as module
 from navfilters.sar.images.autofocusing import sharpness
 from navfilters.sar.images.slant_image import Image
 from navfilters.sar.raw.radar import Radar
@@ -122,13 +127,57 @@ def test_each_run_has_its_own_set():
     assert np.ptp(shared.log[2].speed) < 2.5
 
 
-def test_the_report(monkeypatch):
-    made = {
-        name: [[table(k, 0.1), table(k, 0.2)] for k in (1, 2, 3)]
-        for name in ("variance", "entropy")
-    }
-    monkeypatch.setattr(module, "own_tables", lambda runs, progress: made)
-    lines = own_report(4).splitlines()
-    assert len(lines) == 9
-    assert lines[8].startswith("TC-2, entropy, own")
+def own(*peaks):
+    """A set of images for each peak, on level ground."""
+    tables = [[table(k, peak) for peak in peaks] for k in (1, 2, 3)]
+    up = np.array([[t.r_f[0] for t in of_k] for of_k in tables])
+    return OwnImages(tables, tables, up / np.linalg.norm(up, axis=-1, keepdims=True))
+
+
+def test_a_filter_is_told_another_covariance_of_the_pixel():
+    found, D = own(0.0, 0.2), CASES["TC-2"].geometry.D
+    usual, _ = fly_own_images("TC-2", found.variance, 4)
+    told, _ = fly_own_images("TC-2", found.variance, 4, D=D)
+    assert_allclose(told.errors, usual.errors, atol=1e-6)
+    second = np.broadcast_to(D, (3, 2, 3, 3)).copy()
+    second[:, 1] *= 100
+    told, _ = fly_own_images("TC-2", found.variance, 4, D=second)
+    more = np.linalg.det(told.covariances[3]) / np.linalg.det(usual.covariances[3])
+    assert_allclose(more[::2], 1, rtol=1e-3)
+    assert (more[1::2] > 10).all()
+
+
+def test_the_report():
+    lines = own_report(own(0.1, 0.2), 4).splitlines()
+    assert len(lines) == 13
+    assert lines[11].startswith("TC-2, entropy, own")
     assert lines[1].endswith(" 0")
+
+
+def test_stored_sets_come_back(tmp_path):
+    found = own(0.1, 0.2)
+    found = found._replace(
+        entropy=[[t._replace(sharpness=t.sharpness * 2) for t in of_k] for of_k in found.entropy]
+    )
+    write_own(tmp_path / "own.npz", found)
+    again = read_own(tmp_path / "own.npz")
+    assert_array_equal(again.axes, found.axes)
+    assert_array_equal(again.entropy[2][1].sharpness, found.entropy[2][1].sharpness)
+    assert_array_equal(again.variance[2][1].sharpness, found.variance[2][1].sharpness)
+    assert again.variance[0][0].climb(7400.0, (4.0,)) == found.variance[0][0].climb(7400.0, (4.0,))
+    with pytest.raises(ValueError, match="found none"):
+        read_own(tmp_path / "other.npz")
+
+
+@pytest.mark.slow
+def test_the_stored_sets_are_what_the_library_computes(monkeypatch):
+    """The first image of the first run, without the other two."""
+    monkeypatch.setattr(own_images, "UPDATES", 1)
+    (made,), kept = (
+        own_tables(1, progress=lambda work: nullcontext(lambda done: None))[0],
+        read_own(),
+    )
+    stored = kept.variance[0][0]
+    assert_allclose(made[0].r_f, stored.r_f, atol=0.1)
+    assert_allclose(made[0].sharpness, stored.sharpness, rtol=1e-3)
+    assert kept.normal.shape == (3, len(kept.variance[0]), 3)

@@ -155,3 +155,15 @@ def test_the_flight_without_the_antenna_is_a_table_too(monkeypatch, capsys):
     with pytest.raises(SystemExit):
         command.main(["--without-antenna", "--closed-loop"])
     assert "--without-antenna is open-loop" in capsys.readouterr().err
+
+
+def test_own_images_are_flown_and_stored(monkeypatch, tmp_path, capsys):
+    found = pogorelsky2020.read_own()
+    monkeypatch.setattr(command, "own_tables", lambda runs: found)
+    command.main(["--own-images", "--runs", "2", "--out", str(tmp_path / "own.npz")])
+    assert capsys.readouterr().out.count("TC-2, entropy") == 3
+    again = pogorelsky2020.read_own(tmp_path / "own.npz")
+    assert np.array_equal(again.errors, found.errors)
+    with pytest.raises(SystemExit):
+        command.main(["--out", "own.npz"])
+    assert "--out must come with --own-images" in capsys.readouterr().err

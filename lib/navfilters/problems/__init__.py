@@ -3,6 +3,7 @@
 from navfilters.problems.catalogue import problems
 from navfilters.problems.cures import Cure, UnfitError
 from navfilters.problems.evaluations import evaluations
+from navfilters.problems.fresh import Fresh, fresh, fresh_report
 from navfilters.problems.later_cures import CURES, LATER
 from navfilters.problems.noisier import Noisier
 from navfilters.problems.outcome import Outcome, treat
@@ -21,6 +22,7 @@ __all__ = [
     "Cell",
     "Cure",
     "Draw",
+    "Fresh",
     "Noisier",
     "Outcome",
     "Problem",
@@ -30,6 +32,8 @@ __all__ = [
     "cells",
     "elsewhere",
     "evaluations",
+    "fresh",
+    "fresh_report",
     "in_units",
     "listing",
     "own",

@@ -1,4 +1,4 @@
-"""Compute and draw the whole table: ``python -m navfilters.problems``."""
+"""Compute the whole table: ``python -m navfilters.problems``; ``--help`` for more."""
 
 import argparse
 import sys
@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from navfilters.numerics.extras import command
 from navfilters.problems import stored
 from navfilters.problems.catalogue import problems
+from navfilters.problems.fresh import fresh, fresh_report
 from navfilters.problems.table import table
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Compute the table at its full size, and store it.
+    """Compute the table at its full size, and store it; or try its best values again.
 
     Parameters
     ----------
@@ -22,10 +23,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--runs", type=int, default=stored.RUNS, help="of each pair")
     parser.add_argument("--workers", type=int, help="processes; one per core by default")
     parser.add_argument("--quick", action="store_true", help="200 updates of the static fix")
+    parser.add_argument(
+        "--fresh", action="store_true", help="only the best scanned values, on other draws"
+    )
     parser.add_argument("--out", default=stored.FILE, help="file of the table")
     chosen = parser.parse_args(arguments)
     if chosen.runs < 2:
         parser.error(f"--runs must be at least 2; found {chosen.runs}")
+    if chosen.fresh:
+        rows = fresh(stored.read(), problems(full=not chosen.quick), chosen.runs)
+        sys.stdout.write(f"{fresh_report(rows)}\n")
+        return
     found = table(
         chosen.runs,
         patients=problems(full=not chosen.quick),

@@ -68,11 +68,19 @@ from navfilters.papers.pogorelsky2020.own_images import (
     OFFSETS,
     SHORT_PULSE,
     WHOLE,
+    OwnImages,
     Sighting,
     fly_own_images,
     look_at,
+    measured_sigma,
     own_report,
     own_tables,
+)
+from navfilters.papers.pogorelsky2020.own_store import read_own, write_own
+from navfilters.papers.pogorelsky2020.pixel_errors import (
+    image_axes,
+    pixel_covariance,
+    terrain_normal,
 )
 from navfilters.papers.pogorelsky2020.real_flight import (
     MISSING,
@@ -137,6 +145,7 @@ __all__ = [
     "MonteCarlo",
     "Noise",
     "Outcome",
+    "OwnImages",
     "Patch",
     "RealAttempt",
     "RealImages",
@@ -163,6 +172,7 @@ __all__ = [
     "fly",
     "fly_own_images",
     "fly_with_offsets",
+    "image_axes",
     "image_table",
     "initial_state",
     "linearised_flight",
@@ -170,6 +180,7 @@ __all__ = [
     "look_at",
     "match_blocks",
     "measure_directly",
+    "measured_sigma",
     "misalignment",
     "monte_carlo",
     "monte_carlo_closed",
@@ -179,6 +190,8 @@ __all__ = [
     "open_table",
     "own_report",
     "own_tables",
+    "pixel_covariance",
+    "read_own",
     "real_table",
     "report",
     "run_campaign",
@@ -188,8 +201,10 @@ __all__ = [
     "summary",
     "sweep_speed",
     "tabulate",
+    "terrain_normal",
     "true_flight",
     "truth",
     "white_errors",
     "with_pointing_noise",
+    "write_own",
 ]

@@ -10,7 +10,8 @@ from navfilters.papers.pogorelsky2020.campaign import campaign_report, run_campa
 from navfilters.papers.pogorelsky2020.closed_loop import closed_table
 from navfilters.papers.pogorelsky2020.experiment import CASES
 from navfilters.papers.pogorelsky2020.open_loop import open_table
-from navfilters.papers.pogorelsky2020.own_images import own_report
+from navfilters.papers.pogorelsky2020.own_images import own_report, own_tables
+from navfilters.papers.pogorelsky2020.own_store import write_own
 from navfilters.papers.pogorelsky2020.real_loop import report
 from navfilters.runs.progress import progress as progress_bar
 
@@ -99,6 +100,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         action="store_true",
         help="both cases in closed loop, each run with images that it shares with no other",
     )
+    parser.add_argument(
+        "--out", metavar="FILE", help="with --own-images: where what the images gave is stored"
+    )
     _add_campaign(parser)
     _add_product(parser)
     chosen = parser.parse_args(arguments)
@@ -116,6 +120,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         parser.error(f"--{given[0].replace('_', '-')} must come with --palsar")
     if chosen.direct is not None and chosen.campaign is None:
         parser.error("--direct must come with --campaign")
+    if chosen.out is not None and not chosen.own_images:
+        parser.error("--out must come with --own-images")
     if chosen.palsar is not None:
         needed = ("closed_loop", "dem", "reference")
         if absent := [name.replace("_", "-") for name in needed if not getattr(chosen, name)]:
@@ -125,7 +131,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return
     _counted(parser, chosen, least=2, runs=100)
     if chosen.own_images:
-        sys.stdout.write(f"{own_report(chosen.runs, chosen.seed)}\n")
+        found = own_tables(chosen.runs)
+        if chosen.out is not None:
+            write_own(chosen.out, found)
+        sys.stdout.write(f"{own_report(found, chosen.runs, chosen.seed)}\n")
         return
     if chosen.campaign is not None:
         sys.stdout.write(_campaign(parser, chosen))

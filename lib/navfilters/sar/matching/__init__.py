@@ -1,6 +1,6 @@
 """Matching: an image beside a reference, and where its centre is."""
 
-from navfilters.sar.matching.geolocation import Match, geolocate
+from navfilters.sar.matching.geolocation import Match, geolocate, paired_places
 from navfilters.sar.matching.matcher import MATCHER, Features, Matcher
 from navfilters.sar.matching.reference import Reference, form_reference
 
@@ -12,4 +12,5 @@ __all__ = [
     "Reference",
     "form_reference",
     "geolocate",
+    "paired_places",
 ]

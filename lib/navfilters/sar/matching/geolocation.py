@@ -36,6 +36,32 @@ class Match(NamedTuple):
     affine: Array | None
 
 
+def paired_places(
+    image: GroundImage, reference: Reference, *, relief: bool = True
+) -> tuple[Array, Array]:
+    """Places of the features that are alike, between which ``geolocate`` fits.
+
+    Parameters
+    ----------
+    image : GroundImage
+    reference : Reference
+    relief : bool
+        See ``geolocate``.
+
+    Returns
+    -------
+    tuple of array (n, 2)
+        Column and row in the image and in the reference, pixels; with relief, of the ground.
+    """
+    found = reference.matcher.features(image.values)
+    mine, its = reference.matcher.pairs(found, reference.features)
+    start, end = found.places[mine].astype(float), reference.features.places[its]
+    if relief:
+        end = reference.on_terrain[its, :2]
+        start[:, 0] += _lean(image) * reference.on_terrain[its, 2]
+    return start, end
+
+
 def geolocate(image: GroundImage, reference: Reference, *, relief: bool = True) -> Match:
     """Match an image with the reference, and place its centre pixel on the Earth.
 
@@ -74,16 +100,8 @@ def geolocate(image: GroundImage, reference: Reference, *, relief: bool = True) 
         raise ValueError(
             f"image must have pixels of {reference.pixel} m, as the reference; found {image.pixel}"
         )
-    matcher = reference.matcher
-    found = matcher.features(image.values)
-    mine, its = matcher.pairs(found, reference.features)
-    start, end = found.places[mine].astype(float), reference.features.places[its]
-    lean = 0.0
-    if relief:
-        lean = 1 / (np.tan(image.incidence) * image.pixel)
-        end = reference.on_terrain[its, :2]
-        start[:, 0] += lean * reference.on_terrain[its, 2]
-    affine, inliers = matcher.fit(start, end)
+    start, end = paired_places(image, reference, relief=relief)
+    affine, inliers = reference.matcher.fit(start, end)
     nothing = Match(np.full(3, np.nan), np.nan, np.nan, np.nan, np.nan, np.nan, inliers, None)
     if affine is None:
         return nothing
@@ -91,7 +109,7 @@ def geolocate(image: GroundImage, reference: Reference, *, relief: bool = True) 
     x, y = affine @ [column, row, 1.0]
     if relief:
         for _ in range(20):
-            x, y = affine @ [column + lean * float(reference.height(x, y)), row, 1.0]
+            x, y = affine @ [column + _lean(image) * float(reference.height(x, y)), row, 1.0]
     rows, columns = reference.values.shape
     if not (0 <= x <= columns - 1 and 0 <= y <= rows - 1):
         return nothing
@@ -102,3 +120,8 @@ def geolocate(image: GroundImage, reference: Reference, *, relief: bool = True) 
         latitude, longitude, height = (float(a) for a in reference.ground(x, y))
     r_f = geodetic_to_ecef(latitude, longitude, height)
     return Match(r_f, latitude, longitude, height, float(x), float(y), inliers, affine)
+
+
+def _lean(image: GroundImage) -> float:
+    """By how many columns a metre of height displaces a feature."""
+    return float(1 / (np.tan(image.incidence) * image.pixel))
