@@ -73,14 +73,12 @@ def coasting_transition(G: Array, h: float) -> Array:
     -------
     array (..., 6, 6)
     """
-    g = {(i, j): G[..., i, j] for i in range(3) for j in range(i, 3)}
     F = np.empty((*G.shape[:-2], 6, 6), G.dtype)
-    for i, j in g:
-        one = float(i == j)
-        g_ij = g[i, j]
-        squared = sum(g[tuple(sorted((i, k)))] * g[tuple(sorted((k, j)))] for k in range(3))
-        same = one + (h * h / 2) * g_ij
-        of_r, of_v = h * g_ij + (h**3 / 6) * squared, one * h + (h**3 / 6) * g_ij
+    for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)):
+        one, g = float(i == j), G[..., i, j]
+        squared = sum(G[..., i, k] * G[..., k, j] for k in range(3))
+        same = one + (h * h / 2) * g
+        of_r, of_v = h * g + (h**3 / 6) * squared, one * h + (h**3 / 6) * g
         for a, b in {(i, j), (j, i)}:
             F[..., a, b] = F[..., 3 + a, 3 + b] = same
             F[..., 3 + a, b], F[..., a, 3 + b] = of_r, of_v
