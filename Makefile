@@ -70,7 +70,7 @@ lint: $(VENV)/.test  ## ruff over code and notebooks, mypy and the layers of imp
 
 nbval: $(VENV)/.test  ## run every notebook and compare with its stored outputs
 	PYTHONPATH="$(CURDIR)/tools" $(BIN)/pytest book --nbval --nbval-current-env -n 2 --dist loadscope \
-		-p no:cacheprovider -p keep_executed
+		--no-loadscope-reorder -p no:cacheprovider -p longest_first -p keep_executed
 
 elsewhere: $(VENV)/.test  ## the same without AVX-512, and with another BLAS kernel on one thread
 	$(BIN)/python tools/nbval_elsewhere.py

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 from machines import variants
 
@@ -16,7 +17,11 @@ PYTEST = [
     "2",
     "--dist",
     "loadscope",
+    "--no-loadscope-reorder",
+    "-p",
+    "longest_first",
 ]
+TOOLS = str(Path(__file__).resolve().parent)
 
 
 def main() -> None:
@@ -29,7 +34,9 @@ def main() -> None:
         sys.stdout.write(f"{variant.name}: {variant.environment}\n")
         sys.stdout.flush()
         command = [sys.executable, *PYTEST, "-p", "no:cacheprovider"]
-        bad |= subprocess.run(command, env=os.environ | variant.environment).returncode
+        bad |= subprocess.run(
+            command, env=os.environ | {"PYTHONPATH": TOOLS} | variant.environment
+        ).returncode
     sys.exit(bad)
 
 

@@ -98,6 +98,17 @@ def test_the_aekf_with_memory_multiplies_its_factors_up_to_the_cap():
     assert growth.max() > 1.01 * np.trace(Q)
 
 
+def test_caps_side_by_side_are_caps_one_by_one():
+    p = problem(6, 2, steps=12)
+    options = {"a": 0.5, "N": 4, "directions": np.eye(6)[:, :2], "memory": True}
+    caps = np.array([1.01, 1.5, np.inf])
+    axes = np.expand_dims(caps, tuple(range(1, p.prior.mean.ndim)))
+    together = ruled(AdaptiveNoise(**options, cap=axes), p)[-1].estimate
+    for k, cap in enumerate(caps):
+        alone = ruled(AdaptiveNoise(**options, cap=cap), p)[-1].estimate
+        assert_array_equal(together.cov[k], alone.cov)
+
+
 @pytest.mark.parametrize("engine", ["numpy", pytest.param("jax", marks=pytest.mark.slow)])
 def test_the_current_reading_goes_through_run_and_sweep(engine):
     p = problem(steps=12)

@@ -118,11 +118,13 @@ class AdaptiveNoise(Rule):
     ) -> tuple[Gaussian, AdaptiveMemory]:
         """The prior as it is; its innovation is the newest."""
         assert y is not None
-        xp, past = y.__array_namespace__(), memory.innovations
-        past = xp.broadcast_to(past, (*y.shape[:-1], *past.shape[-2:]))
-        window = xp.concat([past[..., 1:, :], y[..., None, :]], axis=-2)
-        count = xp.broadcast_to(memory.count + 1, y.shape[:-1])
-        factor = xp.broadcast_to(memory.factor, (*y.shape[:-1], *memory.factor.shape[-2:]))
+        xp, past, factor = y.__array_namespace__(), memory.innovations, memory.factor
+        batch = xp.broadcast_shapes(y.shape[:-1], factor.shape[:-2])  # a cap has its own
+        past = xp.broadcast_to(past, (*batch, *past.shape[-2:]))
+        newest = xp.broadcast_to(y[..., None, :], (*batch, 1, y.shape[-1]))
+        window = xp.concat([past[..., 1:, :], newest], axis=-2)
+        count = xp.broadcast_to(memory.count + 1, batch)
+        factor = xp.broadcast_to(factor, (*batch, *factor.shape[-2:]))
         return prior, AdaptiveMemory(window, count, factor)
 
     def _factor(self, window: Array, full: Array) -> Array:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from navfilters.numerics import validation
-from navfilters.numerics.analytic import dot
 from navfilters.types import Array
 
 
@@ -61,13 +60,15 @@ class Gravity:
         xiong2009, Eq. (36), rows 4 to 6.
         """
         xp = r.__array_namespace__()
-        z = r[..., 2]
-        s = 1 / dot(r, r)
+        # By components: nothing but r has a third axis, and its layout in memory is the result's.
+        x, y, z = r[..., 0], r[..., 1], r[..., 2]
+        z2 = z * z
+        s = 1 / (x * x + y * y + z2)
         of_sphere = (-self.mu * s) * xp.sqrt(s)
         of_J2 = (self._k * s) * of_sphere
-        along = of_sphere + of_J2 * (1 - (5 * s) * (z * z))
-        # One factor for each component: r is multiplied once, and the rest has no third axis.
-        return r * (along[..., None] + of_J2[..., None] * xp.asarray(2 * AXIS))
+        along = of_sphere + of_J2 * (1 - (5 * s) * z2)
+        upwards = xp.reshape(xp.asarray(2 * AXIS), (3, *(1,) * z.ndim)) * of_J2
+        return r * xp.permute_dims(along + upwards, (*range(1, r.ndim), 0))
 
     def gradient(self, r: Array) -> Array:
         """Derivative of the acceleration with respect to position: the gravity gradient.
@@ -87,7 +88,8 @@ class Gravity:
         xiong2009, the F of Eq. (4) for Eq. (36).
         """
         xp = r.__array_namespace__()
-        s = (1 / dot(r, r))[..., None]
+        x, y, z = r[..., 0], r[..., 1], r[..., 2]
+        s = (1 / (x * x + y * y + z * z))[..., None]
         u = r * xp.sqrt(s)  # unit vector
         c = u[..., 2:]
         size, k = self.mu * s * xp.sqrt(s), self._k * s
@@ -98,6 +100,11 @@ class Gravity:
         G = of_u[..., :, None] * u[..., None, :] + of_I * xp.eye(3)
         along_n = of_n[..., :, None] * n
         return G + (along_n + along_n.mT)
+
+    @property
+    def fastest(self) -> float:
+        """Angular rate of a circular orbit at the body's radius, rad/s."""
+        return float(np.sqrt(self.mu / self.radius**3))
 
     @property
     def _k(self) -> float:

@@ -11,10 +11,11 @@ import numpy as np
 from navfilters.numerics import validation
 from navfilters.numerics.analytic import dot
 from navfilters.numerics.loops import is_jax, repeat
-from navfilters.numerics.runge_kutta import runge_kutta
+from navfilters.numerics.runge_kutta import euler_increment, runge_kutta_increment
+from navfilters.numerics.whole_paths import in_steps, whole_path
+from navfilters.space import variations
 from navfilters.space.gravity import EARTH, Gravity
 from navfilters.space.thrust import COASTING, Thrust, along_velocity
-from navfilters.space.variations import forwards, middle, rates, series, to_end
 from navfilters.types import Array
 
 
@@ -244,7 +245,10 @@ class Orbit:
         h, x = self.step, path[:-1]
         if self.integrator == "euler":
             return xp.eye(6) + h * self.jacobian(x, thrust)
-        hA = h * self.jacobian(middle(x, path[1:], h), thrust)
+        at = variations.middle(x, path[1:], h)
+        if thrust is None and not is_jax(xp):
+            return variations.coasting_transition(self.gravity.gradient(at[..., :3]), h)
+        hA = h * self.jacobian(at, thrust)
         return xp.eye(6) + hA @ (xp.eye(6) + hA @ (xp.eye(6) / 2 + hA / 6))
 
     def _pushes(self, t: Array, count: int, x: Array) -> Array | None:
@@ -254,21 +258,25 @@ class Orbit:
 
     def _advance(self, pushes: Array | None, k: Array, x: Array) -> Array:
         """The state after sub-step k."""
+        return x + self._increment(pushes, k, x, self.step)
+
+    def _increment(self, pushes: Array | None, k: Array | slice, x: Array, h: float) -> Array:
+        """What h seconds of sub-step k add to a state; of a slice, to a state for each."""
         thrust = None if pushes is None else pushes[k]
         if isinstance(thrust, np.ndarray | np.generic) and not thrust.any():
             thrust = None  # saves its term
-        derivative = partial(self.derivative, thrust=thrust)
-        return INTEGRATORS[self.integrator](derivative, x, self.step)
+        return INTEGRATORS[self.integrator](partial(self.derivative, thrust=thrust), x, h)
 
     def _states(self, x: Array, t: Array) -> Array:
         pushes = self._pushes(t, self.substeps, x)
-        states = [x]
-        for k in range(self.substeps):
-            states.append(self._advance(pushes, k, states[-1]))
-        return x.__array_namespace__().stack(states)
+        increment = partial(self._increment, pushes)
+        if is_jax(x.__array_namespace__()):
+            return in_steps(increment, x, self.step, self.substeps)
+        longest = int(0.13 / (self.gravity.fastest * self.step))
+        return whole_path(increment, x, self.step, self.substeps, longest)
 
     def _to_end(self, states: Array, t: float) -> Iterator[Array]:
-        return to_end(lambda k, part: self.transitions(part, t + k * self.step), states, 6)
+        return variations.to_end(lambda k, x: self.transitions(x, t + k * self.step), states, 6)
 
     def _forwards(self, x: Array, Q: Array | None = None) -> tuple[Array, ...]:
         """f(x), F and, given Q, W, for JAX."""
@@ -277,19 +285,15 @@ class Orbit:
         def sub_step(k: Array, x: Array) -> tuple[Array, Callable[..., Array]]:
             x_next, at, order = self._advance(pushes, k, x), x, 1
             if self.integrator == "rk4":
-                at, order = middle(x, x_next, self.step), 3
+                at, order = variations.middle(x, x_next, self.step), 3
             V = None if pushes is None else along_velocity(at[..., 3:], pushes[k])
-            A = partial(rates, self.gravity.gradient(at[..., :3]), V)
-            return x_next, partial(series, A, self.step, order)
+            A = partial(variations.rates, self.gravity.gradient(at[..., :3]), V)
+            return x_next, partial(variations.series, A, self.step, order)
 
-        return forwards(sub_step, x, self.substeps, 6, Q)
+        return variations.forwards(sub_step, x, self.substeps, 6, Q)
 
 
 POSITION, VELOCITY = np.eye(6)[:3], np.eye(6)[3:]  # r = POSITION @ x; constants, not concat: faster
 
 
-def _euler(derivative: Callable[[Array], Array], x: Array, h: float) -> Array:
-    return x + h * derivative(x)  # Eq. (35)
-
-
-INTEGRATORS = {"rk4": runge_kutta, "euler": _euler}
+INTEGRATORS = {"rk4": runge_kutta_increment, "euler": euler_increment}  # Eq. (35)

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Iterator
 
+import numpy as np
+
 from navfilters.numerics.loops import repeat
 from navfilters.numerics.small_matrices import written_out
 from navfilters.types import Array
@@ -53,6 +55,34 @@ def series(A: Callable[[Array], Array], h: float, order: int, M: Array) -> Array
     for i in range(order, 0, -1):  # Horner's scheme: M + h A (M + h/2 A (M + h/3 A M))
         grown = M + (h / i) * A(grown)
     return grown
+
+
+def coasting_transition(G: Array, h: float) -> Array:
+    """exp(h A) to third order in h where no force depends on the velocity, under NumPy.
+
+    [I + h^2/2 G, h I + h^3/6 G; h G + h^3/6 G^2, I + h^2/2 G]
+
+    Parameters
+    ----------
+    G : array (..., 3, 3)
+        Derivative of the acceleration with respect to position, s^-2, symmetric.
+    h : float
+        Length of the step, s.
+
+    Returns
+    -------
+    array (..., 6, 6)
+    """
+    F = np.empty((*G.shape[:-2], 6, 6), G.dtype)
+    for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)):
+        one, g = float(i == j), G[..., i, j]
+        squared = sum(G[..., i, k] * G[..., k, j] for k in range(3))
+        same = one + (h * h / 2) * g
+        of_r, of_v = h * g + (h**3 / 6) * squared, one * h + (h**3 / 6) * g
+        for a, b in {(i, j), (j, i)}:
+            F[..., a, b] = F[..., 3 + a, 3 + b] = same
+            F[..., 3 + a, b], F[..., a, 3 + b] = of_r, of_v
+    return F
 
 
 def forwards(

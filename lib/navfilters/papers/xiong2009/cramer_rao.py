@@ -59,15 +59,15 @@ def cramer_rao_bound(
     if not 0 <= a <= 1000:  # beyond, doubles do not carry P
         raise ValueError(f"acceleration must be 0 to 1000 m/s^2; found {acceleration}")
     orbit = replace(setup, step=1.0).orbit(COASTING if thrust == "unknown" else flight.thrust)
-    burning = [flight.thrust.strength(t + 0.5) > 0 for t in range(setup.duration)]
+    burning = flight.thrust.strength(np.arange(setup.duration) + 0.5) > 0
     F = np.zeros((setup.duration, 9, 9)) + np.eye(9)
     F[:, :6, :6] = orbit.transitions(flight.states)
-    unknown = np.array(burning) & (thrust == "unknown")
+    unknown = burning & (thrust == "unknown")
     F[:, :6, 6:] = unknown[:, None, None] * np.concatenate([np.eye(3) / 2, np.eye(3)])
     if thrust == "strength":
         v = flight.states[:-1, 3:] + flight.states[1:, 3:]
         u = v / np.linalg.norm(v, axis=1, keepdims=True)
-        F[:, :6, 6] = np.array(burning)[:, None] * np.concatenate([u / 2, u], axis=1)
+        F[:, :6, 6] = burning[:, None] * np.concatenate([u / 2, u], axis=1)
     Q = np.pad(orbit.Q if process_noise else np.zeros((6, 6)), (0, 3))
     Phi, W = _since_start(F.reshape(-1, setup.interval, 9, 9), Q)
     H = np.pad(

@@ -1,0 +1,22 @@
+"""A plug-in of pytest: the slowest notebooks start first, so that none runs alone at last."""
+
+from typing import Any
+
+LONGEST = (
+    "limits",
+    "navigation",
+    "w3b-filters",
+    "remedies",
+    "closed-loop",
+    "sar-imaging",
+    "fair-comparisons",
+    "autofocus-rivals",
+    "geolocation",
+)
+"""Of all chapters these took longest, in this order; to be measured again when that changes."""
+
+
+def pytest_collection_modifyitems(items: list[Any]) -> None:
+    """These first, each with its cells in order, and then the others as they come."""
+    order = {name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: order.get(item.path.stem, len(order)))
