@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ SWEEPS = 12
 
 
 def whole_path(
-    increment: Callable[[slice, Array, float], Array], x: Array, h: float, count: int, longest: int
+    increment: Callable[[Any, Array, float], Array], x: Array, h: float, count: int, longest: int
 ) -> Array:
     """The states x_{k+1} = x_k + increment(x_k); under JAX one by one.
 
@@ -68,7 +69,7 @@ def whole_path(
 
 
 def in_steps(
-    increment: Callable[[int, Array, float], Array], x: Array, h: float, count: int
+    increment: Callable[[Any, Array, float], Array], x: Array, h: float, count: int
 ) -> Array:
     """The same one by one, under any array namespace.
 
