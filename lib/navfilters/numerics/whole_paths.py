@@ -2,9 +2,11 @@
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
+from navfilters.numerics.loops import is_jax
 from navfilters.types import Array
 
 AT_A_TIME = 1000
@@ -21,9 +23,9 @@ SWEEPS = 12
 
 
 def whole_path(
-    increment: Callable[[slice, Array, float], Array], x: Array, h: float, count: int, longest: int
+    increment: Callable[[Any, Array, float], Array], x: Array, h: float, count: int, longest: int
 ) -> Array:
-    """The states x_{k+1} = x_k + increment(x_k), under NumPy.
+    """The states x_{k+1} = x_k + increment(x_k); under JAX one by one.
 
     Parameters
     ----------
@@ -50,6 +52,8 @@ def whole_path(
     better guess: each sweep divides its error by thousands. A sweep that returns what it was given
     has found the states that follow from each other.
     """
+    if is_jax(x.__array_namespace__()):
+        return in_steps(increment, x, h, count)
     # Components first in memory, so that the loops run over steps and members.
     states = np.moveaxis(np.empty((6, count + 1, *x.shape[:-1]), x.dtype), 0, -1)
     states[0] = x
@@ -65,7 +69,7 @@ def whole_path(
 
 
 def in_steps(
-    increment: Callable[[int, Array, float], Array], x: Array, h: float, count: int
+    increment: Callable[[Any, Array, float], Array], x: Array, h: float, count: int
 ) -> Array:
     """The same one by one, under any array namespace.
 

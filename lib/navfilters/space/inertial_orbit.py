@@ -12,7 +12,7 @@ from navfilters.numerics import validation
 from navfilters.numerics.analytic import dot
 from navfilters.numerics.loops import is_jax, repeat
 from navfilters.numerics.runge_kutta import euler_increment, runge_kutta_increment
-from navfilters.numerics.whole_paths import in_steps, whole_path
+from navfilters.numerics.whole_paths import whole_path
 from navfilters.space import variations
 from navfilters.space.gravity import EARTH, Gravity
 from navfilters.space.thrust import COASTING, Thrust, along_velocity
@@ -246,10 +246,13 @@ class Orbit:
         if self.integrator == "euler":
             return xp.eye(6) + h * self.jacobian(x, thrust)
         at = variations.middle(x, path[1:], h)
-        if thrust is None and not is_jax(xp):
-            return variations.coasting_transition(self.gravity.gradient(at[..., :3]), h)
-        hA = h * self.jacobian(at, thrust)
-        return xp.eye(6) + hA @ (xp.eye(6) + hA @ (xp.eye(6) / 2 + hA / 6))
+        if is_jax(xp):
+            return variations.third_order(h * self.jacobian(at, thrust))
+        F = variations.coasting_transition(self.gravity.gradient(at[..., :3]), h)
+        if thrust is not None:
+            fires = thrust.reshape(len(thrust), -1).any(axis=1)
+            F[fires] = variations.third_order(h * self.jacobian(at[fires], thrust[fires]))
+        return F
 
     def _pushes(self, t: Array, count: int, x: Array) -> Array | None:
         """Strength in the middle of each sub-step from t, (count, ...), for such states as x."""
@@ -270,8 +273,6 @@ class Orbit:
     def _states(self, x: Array, t: Array) -> Array:
         pushes = self._pushes(t, self.substeps, x)
         increment = partial(self._increment, pushes)
-        if is_jax(x.__array_namespace__()):
-            return in_steps(increment, x, self.step, self.substeps)
         longest = int(0.13 / (self.gravity.fastest * self.step))
         return whole_path(increment, x, self.step, self.substeps, longest)
 

@@ -57,6 +57,12 @@ def series(A: Callable[[Array], Array], h: float, order: int, M: Array) -> Array
     return grown
 
 
+def third_order(hA: Array) -> Array:
+    """exp(h A) to third order, (..., 6, 6)."""
+    eye = hA.__array_namespace__().eye(6)
+    return eye + hA @ (eye + hA @ (eye / 2 + hA / 6))
+
+
 def coasting_transition(G: Array, h: float) -> Array:
     """exp(h A) to third order in h where no force depends on the velocity, under NumPy.
 
