@@ -56,7 +56,7 @@ $(BUILT): $(SOURCES) $(VENV)/.book
 
 test: lint coverage nbval elsewhere pages  ## everything: lint, types, unit tests, notebooks, rendered pages
 
-unit: $(VENV)/.test  ## unit and property tests alone, without the slow ones, in about a minute
+unit: $(VENV)/.test  ## unit and property tests alone, without the slow ones, in about three minutes
 	$(BIN)/pytest tests --ignore tests/book -n 2 --dist worksteal -m "not slow"
 
 coverage: $(VENV)/.test  ## all unit tests, with branch coverage
