@@ -12,11 +12,13 @@ WIDE = """() => {
     for (const piece of document.querySelectorAll(`.bd-article :is(${pieces})`)) {
         if (!piece.checkVisibility() || piece.closest('mjx-container')) continue;
         let box = piece;
-        while (!box.matches('.bd-article') && box.scrollWidth <= box.clientWidth + 1)
-            box = box.parentElement;
+        const holds = box => box.scrollWidth <= box.clientWidth + 1
+            || getComputedStyle(box).overflowX == 'visible';  // that cuts nothing itself
+        while (!box.matches('.bd-article') && holds(box)) box = box.parentElement;
         const name = `${piece.localName}: ${piece.textContent.trim().slice(0, 60)}`;
         if (box.matches('.bd-article')) {
-            const outside = piece.getBoundingClientRect().right > article.right + 1;
+            const { left, right } = piece.getBoundingClientRect();
+            const outside = Math.max(right, left + piece.scrollWidth) > article.right + 1;
             if (outside) found.set(piece, ['cut', name]);
             continue;
         }
