@@ -157,9 +157,7 @@ def test_the_jacobian_is_that_of_the_retraction():
 
 @engines
 @pytest.mark.parametrize("name", ["EKF", "B-EKF 1", "UKF", "B-UKF", "UKFz", *LATER_FILTERS])
-def test_any_moments_fly_on_quaternions(name, engine, request):
-    if (name, engine) == ("GSOF", "jax"):  # without XLA's fusion its Hessian is NaN
-        request.getfixturevalue("compiled_as_users_do")
+def test_any_moments_fly_on_quaternions(name, engine):
     prior, z, sensor, motion, truth = flight(0.1)
     filter_ = (FILTERS | LATER_FILTERS)[name]
     got = sweep(

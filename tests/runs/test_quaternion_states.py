@@ -85,9 +85,7 @@ def test_the_multiplicative_ekf_is_swept_as_it_is_run(engine):
 
 @pytest.mark.parametrize("name", ["UKF", "mtSOF"])
 @engines
-def test_other_moments_are_swept_as_they_are_run(name, engine, request):
-    if (name, engine) == ("mtSOF", "jax"):  # without XLA's fusion its Hessian is NaN
-        request.getfixturevalue("compiled_as_users_do")
+def test_other_moments_are_swept_as_they_are_run(name, engine):
     prior, z, images, dynamics = flown()
     options = {"dynamics": dynamics, "z_per_step": True}
     wanted = run(FILTERS[name], prior, z, images, **options)

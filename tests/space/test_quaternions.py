@@ -141,6 +141,23 @@ def test_a_member_that_fails_stays_alone():
     assert_allclose(rotation_vector(q)[[0, 2]], theta[[0, 2]], rtol=1e-15)
 
 
+@pytest.mark.parametrize("outer", [jax.jacfwd, jax.jacrev])
+@pytest.mark.parametrize("inner", [jax.jacfwd, jax.jacrev])
+def test_derivatives_under_jax_where_nothing_turns(inner, outer):
+    """dq = (theta / 2, 1 - theta' theta / 8) and theta = 2 v to second order."""
+    there, none = inner(from_rotation_vector), jnp.zeros(3)
+    assert_array_equal(there(none), np.eye(4, 3) / 2)
+    second = np.zeros((4, 3, 3))
+    second[3] = -np.eye(3) / 4
+    assert_array_equal(outer(there)(none), second)
+
+    def of_vector_part(v):
+        return rotation_vector(jnp.concat([v, jnp.ones(1)]))
+
+    assert_array_equal(inner(of_vector_part)(none), 2 * np.eye(3))
+    assert_array_equal(outer(inner(of_vector_part))(none), np.zeros((3, 3, 3)))
+
+
 def test_the_same_source_compiles_under_jax():
     rng = np.random.default_rng(2)
     q, theta = normalized(rng.normal(size=(5, 4))), rng.normal(size=(5, 3))

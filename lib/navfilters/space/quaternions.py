@@ -140,16 +140,19 @@ def from_rotation_vector(theta: Array) -> Array:
     Notes
     -----
     The sine is divided by the angle as sinc, which is 1 at zero: nothing is lost for small angles.
+    At zero the two series stand, so that first and second derivatives are there what they are.
 
     References
     ----------
     pogorelsky2020, Eqs. (25) and (37), which is 0/0 as printed for no rotation.
     """
     xp = theta.__array_namespace__()
-    angle = xp.sqrt(dot(theta, theta))[..., None]
-    some = xp.where(angle.real > 0, angle, 1.0)
-    ratio = xp.where(angle.real > 0, xp.sin(some / 2) / some, 0.5)
-    return xp.concat([ratio * theta, xp.cos(angle / 2)], axis=-1)
+    square = dot(theta, theta)[..., None]
+    turns = square.real > 0
+    angle = xp.sqrt(xp.where(turns, square, 1.0))  # a root at 0 has no derivative
+    ratio = xp.where(turns, xp.sin(angle / 2) / angle, 0.5 - square / 48)
+    cosine = xp.where(turns, xp.cos(angle / 2), 1.0 - square / 8)
+    return xp.concat([ratio * theta, cosine], axis=-1)
 
 
 def rotation_vector(q: Array) -> Array:
@@ -171,7 +174,8 @@ def rotation_vector(q: Array) -> Array:
     """
     xp = q.__array_namespace__()
     v, s = q[..., :3], q[..., 3:]
-    sine = xp.sqrt(dot(v, v))[..., None]
-    some = xp.where(sine.real > 0, sine, 1.0)
-    ratio = xp.where(sine.real > 0, 2 * atan2(some, absolute(s)) / some, 2.0)
+    square = dot(v, v)[..., None]
+    turned = square.real > 0
+    sine = xp.sqrt(xp.where(turned, square, 1.0))
+    ratio = xp.where(turned, 2 * atan2(sine, absolute(s)) / sine, 2.0)
     return xp.where(s.real < 0, -ratio, ratio) * v
