@@ -5,6 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 BUILT := _build/.complete
 BENCH := .venv-bench
+TOOLS := _build/dist-tools/bin
 SOURCES := $(shell find book lib -type f -not -path '*/__pycache__/*' -not -name '.*' -not -path '*/thumbnails/*' 2>/dev/null) \
 	_config.yml _toc.yml requirements.txt tools/execute_notebooks.py tools/executed.py tools/thumbnails.py \
 	tools/book_pages.py tools/icons.js tools/search-order.js tools/downloads.py
@@ -92,9 +93,9 @@ pdf: $(VENV)/.test $(BUILT)  ## the whole book as _build/book.pdf, printed by Ch
 	$(BIN)/python tools/pdf.py _build/html _build/book.pdf
 
 dist: $(VENV)/.book  ## wheel and sdist in _build/dist, checked and installed into empty environments
-	test -x _build/dist-tools/bin/twine || $(PYTHON) -m venv --clear _build/dist-tools
-	_build/dist-tools/bin/python -m pip install --quiet --disable-pip-version-check uv twine
-	$(BIN)/python tools/check_package.py _build/dist-tools/bin
+	test -x $(TOOLS)/twine || $(PYTHON) -m venv --clear _build/dist-tools
+	$(TOOLS)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dist.txt
+	$(BIN)/python tools/check_package.py $(TOOLS)
 
 serve: $(VENV)/.book  ## the book at http://localhost:8000, built again when a page changes
 	$(BIN)/python tools/serve.py
@@ -107,15 +108,12 @@ bench: $(BENCH)/.ready $(VENV)/.book  ## measure beside the peers and a C loop; 
 campaign: $(VENV)/.book  ## the closed loop at the paper's size; stopped, it goes on where it was
 	$(BIN)/python -m navfilters.papers.pogorelsky2020 --campaign campaign
 
-lock:  ## refresh the three requirements.txt from their .in lists
-	$(PYTHON) -m venv _build/lock
-	_build/lock/bin/python -m pip install --quiet uv
-	_build/lock/bin/uv pip compile --quiet --upgrade --universal --generate-hashes \
-		--python-version 3.11 requirements.in -o requirements.txt
-	_build/lock/bin/uv pip compile --quiet --upgrade --universal --generate-hashes \
-		--python-version 3.11 requirements-test.in -o requirements-test.txt
-	_build/lock/bin/uv pip compile --quiet --upgrade --universal --generate-hashes \
-		--python-version 3.11 benchmarks/requirements.in -o benchmarks/requirements.txt
+lock:  ## refresh the requirements.txt of book, tests, packages and bench from their .in lists
+	test -x $(TOOLS)/uv || $(PYTHON) -m venv --clear _build/dist-tools
+	$(TOOLS)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dist.txt
+	for list in requirements requirements-test requirements-dist benchmarks/requirements; do \
+		$(TOOLS)/uv pip compile --quiet --upgrade --universal --generate-hashes \
+			--python-version 3.11 $$list.in -o $$list.txt || exit 1; done
 
 $(VENV)/.book: requirements.txt pyproject.toml
 	$(call made,$(VENV),$(MOVED))

@@ -18,6 +18,7 @@ GROUPS = {
             "navfilters.papers.perea2007.__main__",
             "divergence maps; ten filters with noise",
         ),
+        "lecture16": ("navfilters.papers.lecture16.__main__", "three filters on a pendulum"),
         "xiong2009": ("navfilters.papers.xiong2009.__main__", "the flight through two burns"),
         "pogorelsky2020": (
             "navfilters.papers.pogorelsky2020.__main__",

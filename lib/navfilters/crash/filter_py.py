@@ -117,7 +117,7 @@ def _sampled(make: Callable[..., Any]) -> Adapted:
     return Adapted(predict, update, True)
 
 
-def _cubature(kind: Any, n: int, m: int, hx: Any, fx: Any, calls: dict) -> Any:
+def _cubature(kind: Any, n: int, m: int, hx: Any, fx: Any, calls: dict[Any, Any]) -> Any:
     theirs = kind(n, m, 1.0, hx=hx, fx=fx)
     if "residual_z" in calls:
         residual = calls["residual_z"]

@@ -64,7 +64,7 @@ def _real_vector(x: Any) -> np.ndarray:
     return x
 
 
-def _by_complex_step(f: Callable, x: np.ndarray, step: float, name: str) -> np.ndarray:
+def _by_complex_step(f: Callable[..., Any], x: np.ndarray, step: float, name: str) -> np.ndarray:
     """The Jacobian as it comes, without the comparison: what a filter calls at every step."""
     columns = []
     for j in range(x.shape[-1]):
@@ -86,14 +86,16 @@ def _by_complex_step(f: Callable, x: np.ndarray, step: float, name: str) -> np.n
     return np.stack(columns, axis=-1)
 
 
-def _depends(f: Callable, x: np.ndarray, j: int) -> bool:
+def _depends(f: Callable[..., Any], x: np.ndarray, j: int) -> bool:
     """Whether f changes with component j: a function that ignores it may return real numbers."""
     moved = x.astype(float)
     moved[..., j] += 1e-3 * (1 + np.abs(x[..., j]))
     return not np.array_equal(f(moved), f(x), equal_nan=True)
 
 
-def _compare_with_differences(f, x, J, name, core=None) -> None:
+def _compare_with_differences(
+    f: Callable[..., Any], x: np.ndarray, J: np.ndarray, name: str, core: int | None = None
+) -> None:
     """Refuse a Jacobian that central difference quotients contradict.
 
     An element is confirmed by one quotient that is sharp and agrees. It is refused if none
@@ -149,7 +151,9 @@ def _compare_with_differences(f, x, J, name, core=None) -> None:
         )
 
 
-def _quotient(f, x, h, j, core) -> tuple:
+def _quotient(
+    f: Callable[..., Any], x: np.ndarray, h: np.ndarray, j: int, core: int
+) -> tuple[np.ndarray, ...]:
     """df/dx_j by differences of sixth order, a bound on its error, and whether to believe both.
 
     The bound: a hundred times what the sixth order changes in the fourth, and the sixth difference,
@@ -159,7 +163,7 @@ def _quotient(f, x, h, j, core) -> tuple:
     step = h[..., j]
     middle = np.asarray(f(x)).real
 
-    def at(k):
+    def at(k: int) -> np.ndarray:
         moved = x.copy()
         moved[..., j] += k * step
         try:

@@ -35,7 +35,7 @@ class ByComplexStep:
         What to call function in an error.
     """
 
-    function: Callable
+    function: Callable[..., Any]
     position: int
     name: str
     examined: bool = False
@@ -68,14 +68,14 @@ class ByComplexStep:
         self.examined = True
         return J
 
-    def _of_one(self, arguments: tuple) -> tuple[Callable, np.ndarray]:
+    def _of_one(self, arguments: tuple[Any, ...]) -> tuple[Callable[..., Any], np.ndarray]:
         before, after = arguments[: self.position], arguments[self.position + 1 :]
         x = _real_vector(arguments[self.position])
         return (lambda z: self.function(*before, z, *after)), x
 
 
 def jacobian(
-    function: Callable, position: int, given: Callable | None, *, name: str
+    function: Callable[..., Any], position: int, given: Callable[..., Any] | None, *, name: str
 ) -> Callable[..., np.ndarray]:
     """The Jacobian that was given, or that of function in one of its arguments by complex step.
 
@@ -99,7 +99,7 @@ def jacobian(
     return ByComplexStep(function, position, name) if given is None else given
 
 
-def examine(derivative: Callable, points: list[tuple]) -> None:
+def examine(derivative: Callable[..., Any], points: list[tuple[Any, ...]]) -> None:
     """Compare a Jacobian by complex step with differences; one that was given is left alone.
 
     Parameters

@@ -72,7 +72,9 @@ def _compiled_root(A: Array, L: Array) -> tuple[Array, Array]:
     return xp.where(some, S, L), xp.where(some, T, xp.eye(A.shape[-1]))
 
 
-def _where_any(some: Array, function: Callable, otherwise: Callable, *arrays: Array) -> Any:
+def _where_any(
+    some: Array, function: Callable[..., Any], otherwise: Callable[..., Any], *arrays: Array
+) -> Any:
     """function(*arrays) if it is true of some member, else the cheaper otherwise(*arrays).
 
     What is right for all members is function; a branch that compiles saves it.

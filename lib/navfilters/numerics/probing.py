@@ -18,8 +18,8 @@ AGREEMENT = 1e-6
 
 def probe(
     name: str,
-    function: Callable,
-    arguments: tuple,
+    function: Callable[..., Any],
+    arguments: tuple[Any, ...],
     core: tuple[int, ...],
     batch: tuple[int, ...] | None = None,
     *,
@@ -57,7 +57,7 @@ def probe(
         As of :func:`~navfilters.numerics.complex_step.complex_step`.
     """
 
-    def wrong(found: Any, shape: tuple = ("...", *core)) -> ValueError:
+    def wrong(found: Any, shape: tuple[Any, ...] = ("...", *core)) -> ValueError:
         needed = ", ".join(map(str, shape)) + "," * (len(shape) == 1)
         shapes = ", ".join(str(np.shape(a)) for a in arguments)
         return ValueError(
@@ -88,8 +88,8 @@ def probe(
 
 def members(
     name: str,
-    function: Callable,
-    arguments: tuple,
+    function: Callable[..., Any],
+    arguments: tuple[Any, ...],
     states: int,
     core: tuple[int, ...],
     batch: tuple[int, ...],
@@ -192,7 +192,7 @@ def first_member(x: np.ndarray, core: int = 1) -> np.ndarray:
 
 def alike(
     name: str,
-    function: Callable,
+    function: Callable[..., Any],
     x: np.ndarray,
     core: tuple[int, ...],
     own: tuple[int, ...],

@@ -162,7 +162,7 @@ def _deferred_cholesky(A: Array) -> tuple[Array, Array, Array]:
     S = [[zero] * n for _ in range(n)]
     live: list[Array] = []
 
-    def rest(i, j, done):
+    def rest(i: int, j: int, done: int) -> Array:
         return A[..., max(i, j), min(i, j)] - sum(S[i][k] * S[j][k] for k in range(done))
 
     for j in range(n):

@@ -110,7 +110,7 @@ def _swept(increment: Callable[[slice, Array, float], Array], part: Array, h: fl
     return False
 
 
-def _of_part(increment: Callable, steps: range, some: slice, x: Array, h: float) -> Array:
+def _of_part(increment: Callable[..., Any], steps: range, some: slice, x: Array, h: float) -> Array:
     return increment(slice(steps[some].start, steps[some].stop), x, h)
 
 

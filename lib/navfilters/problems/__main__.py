@@ -2,7 +2,8 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 from navfilters.numerics.extras import command
 from navfilters.problems import stored
@@ -44,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     sys.stdout.write(f"{len(found)} rows in {chosen.out}\n")
 
 
-def _bar(parts, total=None):
+def _bar(parts: Iterable[Any], total: int | None = None) -> Iterable[Any]:
     try:
         from tqdm import tqdm
     except ImportError:

@@ -113,7 +113,7 @@ def table(
     patients: Mapping[str, Problem] | None = None,
     cures: Iterable[Cure] = CURES,
     workers: int | None = 1,
-    progress: Callable[..., Iterable] = lambda parts, total=None: parts,
+    progress: Callable[..., Iterable[Any]] = lambda parts, total=None: parts,
 ) -> list[Cell]:
     """Every cure on every problem.
 

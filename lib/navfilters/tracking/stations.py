@@ -1,6 +1,7 @@
 """What stations measure of a satellite: range by a signal's way, azimuth and elevation."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -31,7 +32,7 @@ class Sites:
     axes: Array
     height: Array
 
-    def __getitem__(self, rows) -> "Sites":
+    def __getitem__(self, rows: Any) -> "Sites":
         """Some of them."""
         return Sites(*(a[rows] for a in (self.position, self.velocity, self.axes, self.height)))
 

@@ -1,7 +1,7 @@
 """Entries of the ledger, and what each of them must say."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -44,8 +44,8 @@ class Word:
     """
 
     meaning: str
-    rule: Mapping
-    shape_rule: Mapping | None = None
+    rule: Mapping[str, Any]
+    shape_rule: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -115,13 +115,13 @@ class Claim:
     threshold: str | None = None
     word: str = ""
     own_rule: str = ""
-    reproduced_within: Mapping | None = None
-    shape_rule: Mapping | None = None
+    reproduced_within: Mapping[str, Any] | None = None
+    shape_rule: Mapping[str, Any] | None = None
     left_open: str = ""
     quantifier: str = ""
-    revised: tuple | list = ()
-    tolerance: Mapping | None = None
-    agreement: Mapping | None = None
+    revised: tuple[Any, ...] | list[Any] = ()
+    tolerance: Mapping[str, Any] | None = None
+    agreement: Mapping[str, Any] | None = None
     route: str = ""
     reason: str = ""
 
@@ -135,7 +135,7 @@ class Claim:
         return self.verdict == ESTABLISHED
 
 
-def _faults(claim: Claim):
+def _faults(claim: Claim) -> Iterator[str]:
     """Whatever an entry gets wrong, in words."""
     if claim.kind not in KINDS:
         yield f"kind must be one of {KINDS}; found {claim.kind!r}"
@@ -146,7 +146,7 @@ def _faults(claim: Claim):
         yield from _faults_of_rules(claim)
 
 
-def _faults_of_finding(claim: Claim):
+def _faults_of_finding(claim: Claim) -> Iterator[str]:
     if claim.paper_value is not None or claim.threshold or claim.agreement is None:
         yield (
             "a finding of the book's own has an agreement, and neither paper_value nor threshold"
@@ -155,7 +155,7 @@ def _faults_of_finding(claim: Claim):
         yield "a finding of the book's own says in route how its second computation was made"
 
 
-def _faults_of_source(claim: Claim):
+def _faults_of_source(claim: Claim) -> Iterator[str]:
     if claim.paper_value is None or claim.agreement is not None:
         yield "a claim of a source has a paper_value and no agreement"
     if claim.threshold not in (PRINTED, OURS):
@@ -177,7 +177,7 @@ def _faults_of_source(claim: Claim):
         yield f"revised is a list of tables of was and why; found {claim.revised!r}"
 
 
-def _faults_of_rules(claim: Claim):
+def _faults_of_rules(claim: Claim) -> Iterator[str]:
     rules = [
         ("reproduced_within", _NEAR),
         ("tolerance", {"abs", "rel"}),
@@ -293,7 +293,7 @@ def _load(path: Path, stamp: int) -> tuple[dict[str, Claim], dict[str, Word]]:
     return ledger, words
 
 
-def _make(kind: type, name: str, entry: Mapping):
+def _make(kind: type, name: str, entry: Mapping[str, Any]) -> Any:
     try:
         return kind(**entry)
     except TypeError as error:

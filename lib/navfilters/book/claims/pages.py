@@ -183,7 +183,7 @@ def text(words: str) -> str:
     return html.escape(words, quote=False)
 
 
-def rule_of(rule: Mapping) -> str:
+def rule_of(rule: Mapping[str, Any]) -> str:
     if "factor" in rule:
         return f"within a factor {rule['factor']:g}"
     return rich(rule)

@@ -5,6 +5,7 @@ import tomllib
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from .ledger import ClaimError, find
 from .pages import Page, table
@@ -41,7 +42,7 @@ class Statement:
     section: str
     what: str
     text: str
-    claims: tuple = ()
+    claims: tuple[Any, ...] = ()
     set_aside: str = ""
     open: str = ""
     shown: str = ""

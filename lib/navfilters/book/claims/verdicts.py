@@ -17,21 +17,21 @@ from .ledger import (
 _WORST_LAST = (REPRODUCED, IN_SHAPE, UNDERDETERMINED, NOT_REPRODUCED)
 
 
-class Readings(dict):
+class Readings(dict[Any, Any]):
     """The values that a claim takes under different readings of a text that leaves them open.
 
     Where the readings do not agree on the verdict, the claim is underdetermined.
     """
 
 
-class Parts(dict):
+class Parts(dict[Any, Any]):
     """The values of the cases, places or settings that a source claims together.
 
     The claim is as good as the worst of them.
     """
 
 
-class Some(dict):
+class Some(dict[Any, Any]):
     """The values of cases of which a source says that the thing can happen.
 
     The claim is as good as the best of them.
@@ -106,7 +106,7 @@ def _bound(claim: Claim, value: Any) -> str:
     return NOT_REPRODUCED
 
 
-def _order(claim: Claim, value: Mapping) -> str:
+def _order(claim: Claim, value: Mapping[str, Any]) -> str:
     names = claim.paper_value
     if set(value) != set(names):
         raise ClaimError(f"{claim.id}: the order is of {names}; found values for {list(value)}")
@@ -141,7 +141,7 @@ def numbers(value: Any) -> list[float]:
     return [float(value)]
 
 
-def near(value: Any, target: Any, rule: Mapping | None) -> bool:
+def near(value: Any, target: Any, rule: Mapping[str, Any] | None) -> bool:
     """Whether every number of value is within the rule of its counterpart."""
     rule = rule or {}
     found, wanted = numbers(value), numbers(target)
@@ -150,13 +150,13 @@ def near(value: Any, target: Any, rule: Mapping | None) -> bool:
     return all(_near_one(a, b, rule) for a, b in zip(found, wanted, strict=True))
 
 
-def _near_one(a: float, b: float, rule: Mapping) -> bool:
+def _near_one(a: float, b: float, rule: Mapping[str, Any]) -> bool:
     if "factor" in rule:
         return b != 0 and 1 / rule["factor"] <= a / b <= rule["factor"]
     return abs(a - b) <= rule.get("abs", 0.0) + rule.get("rel", 0.0) * abs(b)
 
 
-def _within(value: Any, bound: Mapping) -> bool:
+def _within(value: Any, bound: Mapping[str, Any]) -> bool:
     low, high = bound.get("at_least", -math.inf), bound.get("at_most", math.inf)
     found = numbers(value)
     return bool(found) and all(low <= x <= high for x in found)

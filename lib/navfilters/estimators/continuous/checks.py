@@ -1,5 +1,6 @@
 """What a Kalman-Bucy filter is given, checked: errors name the argument and the time."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -8,9 +9,12 @@ from navfilters.estimators.continuous.system import ContinuousSystem, Signal
 from navfilters.numerics import validation
 from navfilters.numerics.jacobians import examine
 from navfilters.numerics.probing import probe
+from navfilters.types import Gaussian
 
 
-def arguments(system, prior, y, t):
+def arguments(
+    system: Any, prior: Any, y: Any, t: Any
+) -> tuple[np.ndarray, Gaussian, Signal, np.ndarray]:
     """What both filters check: t, prior and y; and y at the first time."""
     if not isinstance(system, ContinuousSystem):
         raise TypeError(f"system must be a ContinuousSystem; found {type(system).__name__}")
@@ -43,7 +47,7 @@ def checked_signal(name: str, value: Any, t0: float, size: int | None) -> Signal
     first = np.shape(validation.plain(name, value(t0)))
     wanted = (size,) if size is not None else first if len(first) == 1 else ("m",)
 
-    def checked(s):
+    def checked(s: float) -> np.ndarray:
         array = np.asarray(validation.plain(name, value(s)))
         if array.shape != wanted or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
             found = array if array.shape == wanted else f"shape {array.shape}"
@@ -64,7 +68,15 @@ def tolerances(rtol: Any, atol: Any) -> tuple[float, float]:
     return relative, validation.number("atol", atol, above=0, needed="a finite positive number")
 
 
-def probe_system(system, x, u, w, v, t, p) -> None:
+def probe_system(
+    system: ContinuousSystem,
+    x: np.ndarray,
+    u: np.ndarray,
+    w: np.ndarray,
+    v: np.ndarray,
+    t: float,
+    p: int,
+) -> None:
     """Every function of the system, called once, and R~ = M R M^T."""
     n, at, sensing = x.size, (x, u, w, t), (x, v, t)
     probe("system.f", system.f, at, (n,), ())
@@ -76,7 +88,14 @@ def probe_system(system, x, u, w, v, t, p) -> None:
     validation.covariance("M R M^T, from system.M and system.R,", M @ system.R @ M.T, definite=True)
 
 
-def examine_system(system, states, u, w, v, t) -> None:
+def examine_system(
+    system: ContinuousSystem,
+    states: Iterable[np.ndarray],
+    u: np.ndarray,
+    w: np.ndarray,
+    v: np.ndarray,
+    t: float,
+) -> None:
     """The automatic Jacobians against differences, at some states."""
     with np.errstate(all="ignore"):
         for name in "ABL" if u.size else "AL":

@@ -8,8 +8,12 @@ import numpy as np
 import scipy.integrate
 from scipy.integrate import solve_ivp
 
+from navfilters.estimators.continuous.system import ContinuousSystem, Signal
 from navfilters.numerics import validation
 from navfilters.types import Gaussian
+
+Linearized = Callable[[float, np.ndarray], tuple[np.ndarray, ...]]
+"""Time and estimate -> drift, innovation, A, L, C, M."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,17 +37,26 @@ class Trajectory:
     cov: np.ndarray = field(repr=False)
 
 
-def integrate(system, model, start, t, rtol, atol, method, origin) -> Trajectory:
+def integrate(
+    system: ContinuousSystem,
+    model: Linearized,
+    start: Gaussian,
+    t: np.ndarray,
+    rtol: float,
+    atol: float,
+    method: Any,
+    origin: Signal | None,
+) -> Trajectory:
     """Mean and Riccati equation together; origin(t) is added to the mean afterwards: Eq. (30)."""
     n = start.mean.size
     upper = np.triu_indices(n)
 
-    def unpack(state):
+    def unpack(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         P = np.empty((*state.shape[:-1], n, n))
         P[..., upper[0], upper[1]] = P[..., upper[1], upper[0]] = state[..., n:]
         return state[..., :n], P
 
-    def rate(s, state):
+    def rate(s: float, state: np.ndarray) -> np.ndarray:
         x, P = unpack(state)
         drift, innovation, A, L, C, M = model(s, x)
         try:
@@ -61,15 +74,15 @@ def integrate(system, model, start, t, rtol, atol, method, origin) -> Trajectory
 
     floor = _smallest_deviations(start, model, system.Q, t)
 
-    def deviations(P):
+    def deviations(P: np.ndarray) -> np.ndarray:
         variance = np.diagonal(P, axis1=-2, axis2=-1)
         return np.maximum(np.sqrt(np.maximum(variance, 0.0)), floor)
 
-    def tolerance(state):
+    def tolerance(state: np.ndarray) -> np.ndarray:
         d = deviations(unpack(state)[1])
         return atol * np.concatenate([d, np.outer(d, d)[upper]])
 
-    def check(times, P):
+    def check(times: np.ndarray, P: np.ndarray) -> None:
         """P >= 0 as a correlation, to a hundred times what the integrator was allowed."""
         d = deviations(P)
         smallest = np.linalg.eigvalsh(P / d[..., :, None] / d[..., None, :])[..., 0]
@@ -100,7 +113,7 @@ def integrate(system, model, start, t, rtol, atol, method, origin) -> Trajectory
         )
     check(t[0] + solution.t, unpack(solution.y.T)[1])
 
-    def at(times):
+    def at(times: Any) -> Gaussian:
         times = validation.real_array("times", times, "")
         slack = 1e-9 * (t[-1] - t[0])  # a sum of steps need not end on t[-1] to the last bit
         if times.size and (times.min() < t[0] - slack or times.max() > t[-1] + slack):
@@ -116,7 +129,9 @@ def integrate(system, model, start, t, rtol, atol, method, origin) -> Trajectory
     return Trajectory(t, at, *at(t))
 
 
-def _smallest_deviations(start, model, Q, t) -> np.ndarray:
+def _smallest_deviations(
+    start: Gaussian, model: Linearized, Q: np.ndarray, t: np.ndarray
+) -> np.ndarray:
     """The deviations below which the tolerances do not follow P.
 
     1e-15 of the prior's. For a component without one, what the noise makes of it in a thousandth of
@@ -138,13 +153,13 @@ def _smallest_deviations(start, model, Q, t) -> np.ndarray:
     return np.where(deviation > 0, 1e-15 * deviation, grown)
 
 
-def _following(method: Any, tolerance: Callable) -> Any:
+def _following(method: Any, tolerance: Callable[..., Any]) -> Any:
     """The integrator of SciPy with an absolute tolerance that follows the state."""
     base: Any = getattr(scipy.integrate, method, None) if isinstance(method, str) else method
     if not (isinstance(base, type) and issubclass(base, scipy.integrate.OdeSolver)):
         return method  # for SciPy to refuse
 
-    def step(solver):
+    def step(solver: Any) -> Any:
         solver.atol = tolerance(solver.y)
         if base is scipy.integrate.LSODA:  # which keeps its own
             solver._lsoda_solver._integrator.call_args[1] = solver.atol

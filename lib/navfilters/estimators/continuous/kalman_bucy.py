@@ -96,7 +96,7 @@ def linearized_kalman_bucy(
     check_reference(system, reference, t, residual_tol)
     A, B, L, C, M = (system.jacobian(name) for name in "ABLCM")
 
-    def model(s, x):
+    def model(s: float, x: np.ndarray) -> tuple[np.ndarray, ...]:
         at, sensing = (x_ref(s), u_ref(s), w_ref(s), s), (x_ref(s), v_ref(s), s)
         A_s, L_s, C_s, M_s = A(*at), L(*at), C(*sensing), M(*sensing)
         drift = A_s @ x - L_s @ at[2]
@@ -165,7 +165,7 @@ def extended_kalman_bucy(
     examine_system(system, around(prior), u(t[0]), no_w, no_v, t[0])
     A, L, C, M = (system.jacobian(name) for name in "ALCM")
 
-    def model(s, x):
+    def model(s: float, x: np.ndarray) -> tuple[np.ndarray, ...]:
         at, sensing = (x, u(s), no_w, s), (x, no_v, s)
         innovation = y(s) - system.h(*sensing)
         return system.f(*at), innovation, A(*at), L(*at), C(*sensing), M(*sensing)

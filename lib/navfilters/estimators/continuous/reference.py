@@ -53,7 +53,9 @@ def reference_residual(
     return (a + b) / 2, change / (b - a)[:, None] - np.einsum("k,ikn->in", weights / 2, rates)
 
 
-def check_reference(system, reference, t, tol) -> None:
+def check_reference(
+    system: ContinuousSystem, reference: Reference, t: np.ndarray, tol: float
+) -> None:
     """Eq. (6), to a fraction tol of the largest |f| + |A| |x| + |B| |u| + |L| |w|.
 
     The terms give a scale where f itself is zero to rounding: at an equilibrium.
@@ -78,7 +80,9 @@ def check_reference(system, reference, t, tol) -> None:
         )
 
 
-def reference_signals(system, reference, t0, n) -> tuple[Signal, Signal, Signal, Signal]:
+def reference_signals(
+    system: ContinuousSystem, reference: Reference, t0: float, n: int | None
+) -> tuple[Signal, Signal, Signal, Signal]:
     """x, u, w and v of a reference, checked, with zeros for what it does not give."""
     if not isinstance(reference, Reference):
         raise TypeError(f"reference must be a Reference; found {type(reference).__name__}")

@@ -191,7 +191,7 @@ class Setup:
 def _motion(setup: Setup, angle: float, w: Signal) -> Signal:
     """The pendulum released at rest, (2,) at any time of the experiment."""
 
-    def rate(t, x):
+    def rate(t: float, x: Array) -> Array:
         return setup.f(x, setup.control(t), w(t), t)
 
     span = 0.0, setup.duration
@@ -224,7 +224,7 @@ def band_limited_noise(
     rates = 2 * np.pi * (np.arange(count) + 0.5) / duration
     waves = rng.standard_normal((2 * count, len(root))) * root * np.sqrt(2 / duration)
 
-    def noise(t):
+    def noise(t: Any) -> Array:
         phase = rates * np.asarray(t)[..., None]
         return np.concatenate([np.cos(phase), np.sin(phase)], axis=-1) @ waves
 
@@ -251,7 +251,7 @@ def discretised(system: ContinuousSystem, dt: float) -> DiscreteSystem:
     """
     A, L, C, M = (system.jacobian(name) for name in "ALCM")
 
-    def F(x, u, w, k):
+    def F(x: Array, u: Array, w: Array, k: int) -> Array:
         rate = A(x, u, w, k * dt)
         return np.eye(rate.shape[-1]) + dt * rate
 

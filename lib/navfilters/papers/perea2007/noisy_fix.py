@@ -129,7 +129,9 @@ def follow(
     return Belief(*(np.concatenate(leaf, axis=1) for leaf in zip(*kept, strict=True)))
 
 
-def batch(prior: Gaussian, z: Array, model: RangeBearing, updates: Sequence[int] = UPDATES):
+def batch(
+    prior: Gaussian, z: Array, model: RangeBearing, updates: Sequence[int] = UPDATES
+) -> Belief:
     """Least squares over all measurements at once, and the inverse of the information there.
 
     Parameters

@@ -3,10 +3,11 @@
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from navfilters.papers.pogorelsky2020.experiment import of_case
+from navfilters.papers.pogorelsky2020.experiment import Setup, of_case
 from navfilters.papers.pogorelsky2020.final_nees import nees_line
 from navfilters.papers.pogorelsky2020.without_antenna import MEASURED, Trial, fly, fly_with_offsets
 from navfilters.runs.consistency import nees
@@ -22,7 +23,7 @@ def antenna_table(
     case: str = "TC-1",
     runs: int = 200,
     seed: int = 0,
-    progress: Callable[[Iterable], Iterable] = iter,
+    progress: Callable[[Iterable[Any]], Iterable[Any]] = iter,
 ) -> str:
     """Predicted deviations of the position, and the NEES of all nine, of each trial.
 
@@ -79,11 +80,15 @@ def _jobs(case: str) -> Iterator[Job]:
             yield name, partial(_flown, setup, Trial("antenna"), 72)
 
 
-def _flown(case, trial: Trial, updates: int, runs: list[int], seed: int) -> tuple[Array, Array]:
+def _flown(
+    case: str | Setup, trial: Trial, updates: int, runs: list[int], seed: int
+) -> tuple[Array, Array]:
     found = fly(case, [trial], updates, runs, seed)
     return found.errors[updates, 0], found.covariances[updates, 0]
 
 
-def _with_delay(case, trial: Trial, sigma: float, runs: list[int], seed: int):
+def _with_delay(
+    case: str | Setup, trial: Trial, sigma: float, runs: list[int], seed: int
+) -> tuple[Array, Array]:
     e, P = fly_with_offsets(case, [trial], {"delay": sigma}, runs, seed)
     return e[-1, 0, :, :9], P[-1, 0, :, :9, :9]

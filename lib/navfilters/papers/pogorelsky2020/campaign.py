@@ -1,6 +1,6 @@
 """The closed-loop campaign of Pogorelsky et al.: all runs of both cases."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -72,7 +72,7 @@ def run_campaign(
     seed: int = 0,
     *,
     imaging: Imaging = FULL,
-    progress: Callable = bar,
+    progress: Callable[..., Any] = bar,
 ) -> Campaign:
     """Both test cases in closed loop, 100 runs of three images each by default.
 
@@ -156,7 +156,7 @@ def _table(store: Folder, k: int, done: Callable[[int], Any]) -> ImageTable:
         acquired = acquire(setup, k, store.imaging)
         done(ACQUIRING)
 
-        def counted(speeds):
+        def counted(speeds: Iterable[float]) -> Iterator[float]:
             for speed in speeds:
                 yield speed
                 done(1)
@@ -194,7 +194,7 @@ class _Directly:
         return self.images.measured(k, start, speed, r_f, ended.tolist())
 
 
-def _compare(own: list, alone: MonteCarlo, log: list, closed: MonteCarlo) -> Agreement:
+def _compare(own: list[Any], alone: MonteCarlo, log: list[Any], closed: MonteCarlo) -> Agreement:
     n = alone.errors.shape[1]
     absent, speed, pixel = [], [], []
     for direct, tabulated in zip(own, log, strict=True):

@@ -73,7 +73,7 @@ class Folder:
         arrays = {part: getattr(value, part) for part in type(value).__annotations__}
         stored_arrays.save(self.path / f"{name}.npz", self._job(job), **arrays)
 
-    def _job(self, job: tuple) -> str:
+    def _job(self, job: tuple[Any, ...]) -> str:
         return repr((FORMAT, navfilters.__version__, self.imaging, *job))
 
 

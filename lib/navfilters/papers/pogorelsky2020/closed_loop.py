@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -166,7 +166,7 @@ def monte_carlo_closed(
     seed: int = 0,
     *,
     imaging: Imaging = FULL,
-    progress: Callable[[Iterable], Iterable] = iter,
+    progress: Callable[[Iterable[Any]], Iterable[Any]] = iter,
 ) -> MonteCarlo:
     """All runs of a test case with three images, at 8.33, 16.67 and 25 s, and a coast to 41.67 s.
 
@@ -202,7 +202,7 @@ def closed_table(
     runs: int = 100,
     seed: int = 0,
     imaging: Imaging = FULL,
-    progress: Callable = iter,
+    progress: Callable[..., Any] = iter,
 ) -> str:
     """Position after three images, closed and open loop, and how many images failed.
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -75,7 +75,7 @@ class ImageTable(NamedTuple):
 def image_table(
     acquired: Acquisition,
     imaging: Imaging = FULL,
-    progress: Callable[[Iterable], Iterable] = iter,
+    progress: Callable[[Iterable[Any]], Iterable[Any]] = iter,
 ) -> ImageTable:
     """Sharpness of one image at each assumed velocity, and its match wherever climbs can end.
 

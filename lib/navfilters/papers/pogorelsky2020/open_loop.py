@@ -172,7 +172,7 @@ def monte_carlo(
     measure: Callable[[int, NavigationState], Any] | None = None,
     estimator: Any = None,
     sensor: Any = None,
-    progress: Callable[[Iterable], Iterable] = iter,
+    progress: Callable[[Iterable[Any]], Iterable[Any]] = iter,
 ) -> MonteCarlo:
     """All runs of a test case in one batch.
 
@@ -265,7 +265,7 @@ def first_estimate(setup: Setup, true: NavigationState, drawn: Array) -> Gaussia
 
 
 def open_table(
-    case: str = "TC-1", runs: int = 100, seed: int = 0, progress: Callable = iter
+    case: str = "TC-1", runs: int = 100, seed: int = 0, progress: Callable[..., Any] = iter
 ) -> str:
     """Position at 600 s beside the paper's: deviations, how far they fell, and the NEES.
 

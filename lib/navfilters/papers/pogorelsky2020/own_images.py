@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -116,7 +116,9 @@ class OwnImages(NamedTuple):
         return image_axes(r_f, x[..., :3], x[..., 3:], self.normal)
 
 
-def own_tables(runs: int, imaging: Imaging = WHOLE, *, progress: Callable = bar) -> OwnImages:
+def own_tables(
+    runs: int, imaging: Imaging = WHOLE, *, progress: Callable[..., Any] = bar
+) -> OwnImages:
     """Three images for each run.
 
     Parameters

@@ -71,7 +71,7 @@ def run_filter(
     seed: int = 0,
     *,
     imaging: Imaging = FULL,
-    progress: Callable[[Iterable], Iterable] = iter,
+    progress: Callable[[Iterable[Any]], Iterable[Any]] = iter,
 ) -> Outcome:
     """The filter from its first estimate, one interval before the first patch, through all patches.
 
@@ -183,7 +183,7 @@ def report(
     geoid: float = 0.0,
     unit: str | None = None,
     imaging: Imaging = FULL,
-    progress: Callable[[Iterable], Iterable] = iter,
+    progress: Callable[[Iterable[Any]], Iterable[Any]] = iter,
     **options: Any,
 ) -> str:
     """The closed loop on files, from opening them to the table.

@@ -80,7 +80,7 @@ def fly(
     *,
     flight: Truth | None = None,
     estimator: Any = None,
-    progress: Callable[[Iterable], Iterable] = iter,
+    progress: Callable[[Iterable[Any]], Iterable[Any]] = iter,
 ) -> MonteCarlo:
     """All runs of all trials in one batch; the first estimates and images of ``monte_carlo``.
 

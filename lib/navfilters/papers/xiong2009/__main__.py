@@ -4,6 +4,7 @@ fair comparison."""
 import argparse
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ def table(
     variant: str = "A",
     seeds: Sequence[int] = range(20),
     *,
-    progress: Callable[[Iterable], Iterable] = iter,
+    progress: Callable[[Iterable[Any]], Iterable[Any]] = iter,
 ) -> str:
     """Table 1 beside the paper's: median and range over seeds, of each filter, m.
 
@@ -49,7 +50,7 @@ def comparison(
     variant: str = "A",
     seeds: Sequence[int] = range(24),
     *,
-    progress: Callable[[Iterable], Iterable] = iter,
+    progress: Callable[[Iterable[Any]], Iterable[Any]] = iter,
 ) -> str:
     """The paper's filters and their rivals: RMS errors over seeds, m, and mean NEES.
 

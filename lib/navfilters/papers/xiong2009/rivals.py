@@ -85,7 +85,7 @@ class Rival(NamedTuple):
     q_a: Any = 0.0
     memory: float = np.inf
 
-    def dynamics(self, setup: Setup, arcs: tuple | None = None) -> Any:
+    def dynamics(self, setup: Setup, arcs: tuple[Any, ...] | None = None) -> Any:
         """Its model of the motion; the arcs that it is told are the true ones by default."""
         if not self.told:
             arcs = ((0, setup.duration),)
@@ -172,7 +172,9 @@ def course(
     return Course(z, np.expand_dims(states, tuple(range(2, z.ndim - 1))))
 
 
-def fly_rival(rival: Rival, flights: Course, setup: Setup, arcs: tuple | None = None) -> Flight:
+def fly_rival(
+    rival: Rival, flights: Course, setup: Setup, arcs: tuple[Any, ...] | None = None
+) -> Flight:
     """A rival through the flights.
 
     Parameters
@@ -208,6 +210,6 @@ def fly_rival(rival: Rival, flights: Course, setup: Setup, arcs: tuple | None = 
         return Flight(error, nees(error, cov), nis(y[1:], S[1:]))
 
 
-def _kept(state: Any) -> tuple:
+def _kept(state: Any) -> tuple[Any, ...]:
     mean, cov = state.estimate
     return mean[..., :6], cov[..., :6, :6], state.innovation, state.S

@@ -2,7 +2,7 @@
 
 from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -57,14 +57,16 @@ def truth(setup: Setup = VARIANTS["A"]) -> Truth:
 
 
 @lru_cache(maxsize=16)
-def _truth(gravity: Gravity, x0: tuple, thrust: Thrust, duration: int) -> Truth:
+def _truth(gravity: Gravity, x0: tuple[Any, ...], thrust: Thrust, duration: int) -> Truth:
     states = _fly(gravity, np.array(x0), thrust, np.arange(duration + 1.0))
     states.setflags(write=False)
     return Truth(thrust, states)
 
 
 @lru_cache(maxsize=16)
-def _solved_thrust(gravity: Gravity, x0: tuple, burns: tuple, perigee: float) -> float:
+def _solved_thrust(
+    gravity: Gravity, x0: tuple[Any, ...], burns: tuple[Any, ...], perigee: float
+) -> float:
     """The strength with which the last burn ends at the perigee, m/s^2."""
     start, end = burns[0][0], burns[-1][1]
     before = _fly(gravity, np.array(x0), Thrust(0.0, ()), np.array([0.0, start]))[-1]
