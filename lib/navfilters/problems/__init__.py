@@ -3,7 +3,7 @@
 from navfilters.problems.catalogue import problems
 from navfilters.problems.cures import Cure, UnfitError
 from navfilters.problems.evaluations import evaluations
-from navfilters.problems.fresh import Fresh, fresh, fresh_report
+from navfilters.problems.fresh import Fresh, fresh, fresh_report, read_fresh, write_fresh
 from navfilters.problems.later_cures import CURES, LATER
 from navfilters.problems.noisier import Noisier
 from navfilters.problems.outcome import Outcome, treat
@@ -39,9 +39,11 @@ __all__ = [
     "own",
     "problems",
     "read",
+    "read_fresh",
     "reasons",
     "rows",
     "static_fix",
     "table",
     "treat",
+    "write_fresh",
 ]

@@ -8,7 +8,7 @@ from typing import Any
 from navfilters.numerics.extras import command
 from navfilters.problems import stored
 from navfilters.problems.catalogue import problems
-from navfilters.problems.fresh import fresh, fresh_report
+from navfilters.problems.fresh import FRESH, fresh, fresh_report, write_fresh
 from navfilters.problems.table import table
 
 
@@ -27,12 +27,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--fresh", action="store_true", help="only the best scanned values, on other draws"
     )
-    parser.add_argument("--out", default=stored.FILE, help="file of the table")
+    parser.add_argument("--out", help=f"file of the result: {stored.FILE}, or {FRESH} by default")
     chosen = parser.parse_args(arguments)
     if chosen.runs < 2:
         parser.error(f"--runs must be at least 2; found {chosen.runs}")
     if chosen.fresh:
         rows = fresh(stored.read(), problems(full=not chosen.quick), chosen.runs)
+        write_fresh(chosen.out or FRESH, rows)
         sys.stdout.write(f"{fresh_report(rows)}\n")
         return
     found = table(
@@ -41,8 +42,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         workers=chosen.workers,
         progress=_bar,
     )
-    stored.write(chosen.out, found)
-    sys.stdout.write(f"{len(found)} rows in {chosen.out}\n")
+    out = chosen.out or stored.FILE
+    stored.write(out, found)
+    sys.stdout.write(f"{len(found)} rows in {out}\n")
 
 
 def _bar(parts: Iterable[Any], total: int | None = None) -> Iterable[Any]:

@@ -1,8 +1,11 @@
 """Values chosen in hindsight, tried on draws that had no part in the choice."""
 
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from navfilters.problems.cures import Cure
 from navfilters.problems.later_cures import CURES
@@ -11,6 +14,7 @@ from navfilters.problems.reading import best, own
 from navfilters.problems.table import Cell, cells
 
 PLAIN = "EKF"
+FRESH = "every_cure_fresh.json"
 
 
 class Fresh(NamedTuple):
@@ -87,6 +91,41 @@ def fresh(
 
 def _error(problem: Problem, cure: Cure, runs: int, seed: int) -> float:
     return cells(problem, cure, runs, seed, scan=False)[0].ratio
+
+
+def write_fresh(path: Any, rows: Iterable[Fresh]) -> None:
+    """Store what fresh draws gave, three digits of each number.
+
+    Parameters
+    ----------
+    path : path
+    rows : iterable of Fresh
+    """
+
+    def short(x: float) -> float:
+        return float(f"{x:.3g}")
+
+    kept = [
+        r._replace(then=short(r.then), again=tuple(map(short, r.again)))._asdict() for r in rows
+    ]
+    Path(path).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+
+
+def read_fresh(path: Any = None) -> list[Fresh]:
+    """What fresh draws gave.
+
+    Parameters
+    ----------
+    path : path, optional
+        By default the library's own, of the stored table.
+
+    Returns
+    -------
+    list of Fresh
+    """
+    file = files("navfilters.problems") / FRESH if path is None else Path(path)
+    rows = json.loads(file.read_text(encoding="utf-8"))
+    return [Fresh(**row | {"again": tuple(row["again"])}) for row in rows]
 
 
 def fresh_report(rows: Iterable[Fresh]) -> str:
