@@ -34,7 +34,8 @@ def test_an_equation_has_our_number_and_the_sources(tmp_path, label, numbers):
 
 
 @pytest.mark.parametrize(
-    ("label", "shown"), [("xiong2009-38", "(38)"), ("perea2007-5-to-7", "(5)–(7)"), ("joseph", "(3)")]
+    ("label", "shown"),
+    [("xiong2009-38", "(38)"), ("perea2007-5-to-7", "(5)–(7)"), ("joseph", "(3)")],
 )
 def test_a_reference_shows_the_number_that_the_source_gives(tmp_path, label, shown):
     page = tmp_path / "page.html"
