@@ -33,11 +33,11 @@ MENDED = (
     (re.compile(r"<summary>(?=<span class=.toctree-toggle)"), '<summary aria-label="its pages">'),
 )
 
-# An equation whose label begins with a source's name has that source's number: xiong2009-a14.
-EQUATION = re.compile(
-    r'(id="equation-(perea2007|lecture16|xiong2009|pogorelsky2020)-([\w-]+)">'
-    r'\s*<span class="eqno">)(\(\d+\))'
-)
+# An equation whose label begins with a source's name has that source's number: xiong2009-a14. The
+# text calls it by that number, so a reference shows it alone.
+SOURCE = r"equation-(perea2007|lecture16|xiong2009|pogorelsky2020)-([\w-]+)"
+EQUATION = re.compile(rf'(id="{SOURCE}">\s*<span class="eqno">)(\(\d+\))')
+REFERENCE = re.compile(rf'(<a class="reference internal" href="[^"#]*#{SOURCE}">)\(\d+\)(?=</a>)')
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -129,18 +129,23 @@ def mend(page: Path) -> None:
         if new or page.name != "search.html":
             after = pattern.sub(new, after)
     after = EQUATION.sub(_both_numbers, after)
+    after = REFERENCE.sub(lambda found: found[1] + _numbers(found[3]), after)
     if after != before:
         page.write_text(after, encoding="utf-8")
 
 
 def _both_numbers(found: re.Match) -> str:
     """Our number of an equation, and the source's."""
-    theirs = ", ".join(
-        "–".join(f"({n.replace('a', 'A.')})" for n in part.split("-to-"))
-        for part in re.findall(r"\w+-to-\w+|\w+", found[3])
-    )
-    source = f'<span class="eqno-source">{found[2]} {theirs}</span>'
+    source = f'<span class="eqno-source">{found[2]} {_numbers(found[3])}</span>'
     return f"{found[1]}{source} {found[4]}"
+
+
+def _numbers(label: str) -> str:
+    """The source's numbers: 5-to-7 is (5)–(7)."""
+    return ", ".join(
+        "–".join(f"({n.replace('a', 'A.')})" for n in part.split("-to-"))
+        for part in re.findall(r"\w+-to-\w+|\w+", label)
+    )
 
 
 def few_icons(out: Path) -> None:

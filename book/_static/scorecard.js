@@ -7,7 +7,7 @@
   function begin() {
     const host = document.querySelector(".claims-browser"), data = document.getElementById("ledger");
     if (!host || !data) return;
-    const claims = JSON.parse(data.textContent);
+    const claims = JSON.parse(data.textContent), names = JSON.parse(host.dataset.names);
     const rows = new Map(claims.map((c) => [c.id, document.getElementById(`row-${c.id}`)]));
     const homes = new Map([...rows.values()].filter(Boolean).map((row) => [row, row.parentElement]));
     const folds = [...document.querySelectorAll("details.claims-work")];
@@ -26,7 +26,7 @@
     for (const [name, key] of Object.entries(FILTERS)) {
       const values = [...new Set(claims.map((c) => c[key]))].filter(Boolean);
       controls[name] = make("select", { name, onchange: () => change({ [name]: controls[name].value }) },
-        make("option", { value: "" }, "all"), ...values.map((v) => make("option", { value: v }, v)));
+        make("option", { value: "" }, "all"), ...values.map((v) => make("option", { value: v }, names[v] ?? v)));
       nodes.push(labelled(name === "limit" ? "Limit" : name[0].toUpperCase() + name.slice(1), controls[name]));
     }
     controls.order = make("select", { name: "order", onchange: () => change({ order: controls.order.value }) },

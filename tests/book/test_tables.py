@@ -42,6 +42,26 @@ def test_html_has_a_caption_and_scopes_and_numbers_to_the_right(shown):
     )
 
 
+def test_rows_that_share_their_heading_are_a_group():
+    rows = [("EKF", "A", 1.0), ("EKF", "B", 2.0), ("UKF", "A", 3.0), ("EKF", "A", 4.0)]
+    shown = table(rows, ("filter", "reading", "error"), caption="c")
+    soup = BeautifulSoup(shown._repr_html_(), "html.parser")
+    headings = soup.select("tbody th")
+    assert [th.get_text() for th in headings] == ["EKF", "UKF", "EKF"]
+    assert [(th["scope"], th.get("rowspan")) for th in headings] == [
+        ("rowgroup", "2"),
+        ("row", None),
+        ("row", None),
+    ]
+    assert [len(row.find_all(["th", "td"])) for row in soup.select("tbody tr")] == [3, 2, 3, 3]
+    assert [line.split()[0] for line in repr(shown).splitlines()[2:]] == [
+        "EKF",
+        "EKF",
+        "UKF",
+        "EKF",
+    ]
+
+
 def test_a_notebook_stores_both_forms(shown):
     data, _ = DisplayFormatter().format(shown)
     assert data["text/plain"] == repr(shown)

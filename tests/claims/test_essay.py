@@ -42,6 +42,6 @@ def test_a_table_of_omissions_has_a_row_each():
 
 
 def test_verdicts_are_counted():
-    assert claims.verdicts_of("someone1999") == "of 2 claims, 2 reproduced"
+    assert claims.verdicts_of("someone1999") == "someone1999: of 2 claims, 2 reproduced"
     with pytest.raises(ClaimError, match="no claim"):
         claims.verdicts_of("nobody")

@@ -157,8 +157,10 @@ def test_the_table_has_a_line_for_each_and_its_numbers():
     assert name == "one"
     assert_allclose([float(rms), float(median)], expected, rtol=0.05)
     assert outside == f"{np.mean(~(q[0, -1] < 5.9915)):.0%}"
-    assert (nis, lost) == ("-", f"{one.lost[-1].mean():.0%}")
-    assert lines[3].split()[4:8] == ["-", "-", "100%", "100%"]
+    assert (nis, lost) == ("–", f"{one.lost[-1].mean():.0%}")
+    assert noise_table.rows({"one": one}, SETUP, 1000)[0] == tuple(lines[2].split())
+    assert len(noise_table.COLUMNS) == len(lines[2].split())
+    assert lines[3].split()[4:8] == ["–", "–", "100%", "100%"]
 
 
 def test_the_command_prints_every_table(capsys):

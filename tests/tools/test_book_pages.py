@@ -33,6 +33,19 @@ def test_an_equation_has_our_number_and_the_sources(tmp_path, label, numbers):
     assert f'<span class="eqno-source">{numbers}</span> (3)<a>' in page.read_text()
 
 
+@pytest.mark.parametrize(
+    ("label", "shown"),
+    [("xiong2009-38", "(38)"), ("perea2007-5-to-7", "(5)–(7)"), ("joseph", "(3)")],
+)
+def test_a_reference_shows_the_number_that_the_source_gives(tmp_path, label, shown):
+    page = tmp_path / "page.html"
+    link = f'<a class="reference internal" href="../a/b.html#equation-{label}">'
+    page.write_text(f"{link}(3)</a>")
+    book_pages.mend(page)
+    book_pages.mend(page)  # as a second build does
+    assert page.read_text() == f"{link}{shown}</a>"
+
+
 def test_an_equation_of_ours_has_one_number(tmp_path):
     page = tmp_path / "page.html"
     text = '<div class="math" id="equation-joseph">\n<span class="eqno">(3)<a></a>'

@@ -3,6 +3,7 @@
 import html
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import groupby
 from typing import Any
 
 from navfilters.book.claims import Page
@@ -20,7 +21,8 @@ def table(
     Parameters
     ----------
     rows : iterable of sequences
-        The first item of a row is its heading. Booleans become yes and no, None an empty cell.
+        The first item of a row is its heading; rows one after another that share it are a group,
+        whose heading a page shows once. Booleans become yes and no, None an empty cell.
     columns : sequence of str, or mapping of str to str
         Headings; a mapping gives each a format for its numbers, such as ".1f". A number without
         one is printed as ".4g"; 6.6e+04 becomes 66,000.
@@ -97,18 +99,21 @@ def _html(titles: list[str], cells: list[list[str]], numeric: list[bool], captio
         f'<th scope="col"{kind}>{html.escape(title, quote=False)}</th>'
         for title, kind in zip(titles, style, strict=True)
     )
-    body = "".join(
-        f'<tr><th scope="row"{style[0]}>{_rich(first, numeric[0])}</th>'
-        + "".join(
-            f"<td{kind}>{_rich(cell, right)}</td>"
-            for cell, kind, right in zip(rest, style[1:], numeric[1:], strict=True)
-        )
-        + "</tr>"
-        for first, *rest in cells
-    )
+    groups = [(first, list(rows)) for first, rows in groupby(cells, key=lambda row: row[0])]
+    body = ""
+    for first, rows in groups:
+        scope = f'"rowgroup" rowspan="{len(rows)}"' if len(rows) > 1 else '"row"'
+        heading = f"<th scope={scope}{style[0]}>{_rich(first, numeric[0])}</th>"
+        for _, *rest in rows:
+            line = "".join(
+                f"<td{kind}>{_rich(cell, right)}</td>"
+                for cell, kind, right in zip(rest, style[1:], numeric[1:], strict=True)
+            )
+            body, heading = f"{body}<tr>{heading}{line}</tr>", ""
+    grouped = ' class="grouped"' if len(groups) < len(cells) else ""
     name = html.escape(caption)
     return (
-        f'<div class="results" role="group" aria-label="{name}" tabindex="0"><table>'
+        f'<div class="results" role="group" aria-label="{name}" tabindex="0"><table{grouped}>'
         f"<caption>{html.escape(caption, quote=False)}</caption>"
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
     )

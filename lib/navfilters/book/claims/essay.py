@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .ledger import VERDICTS, Claim, ClaimError, load
-from .pages import Page, plain, rich, slug, work_of
+from .pages import Page, named, plain, rich, slug, work_of
 from .pages import table as table_of
 
 _PLACE = re.compile(r"\{([^{}]*)\}")
@@ -59,7 +59,7 @@ def omissions(rows: Sequence[tuple[str, str, str]]) -> Page:
 
 
 def verdicts_of(work: str) -> str:
-    """How many of a source's claims got which verdict, in words.
+    """A source's name, and how many of its claims got which verdict.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def verdicts_of(work: str) -> str:
     if not found:
         raise ClaimError(f"no claim of {work!r}")
     counted = [f"{found.count(v)} {v}" for v in VERDICTS if v in found]
-    return f"of {len(found)} claims, " + ", ".join(counted)
+    return f"{named(work)}: of {len(found)} claims, " + ", ".join(counted)
 
 
 def _filled(words: str, ledger: Mapping[str, Claim]) -> str:

@@ -17,6 +17,14 @@ from .ledger import (
     load_words,
 )
 
+NAMES = {
+    "perea2007": "Perea et al. 2007",
+    "lecture16": "Lecture 16",
+    "xiong2009": "Xiong et al. 2009",
+    "pogorelsky2020": "Pogorelsky et al. 2020",
+}
+"""What a reader sees of a source; one without a name here is called by its key."""
+
 OF_A_SOURCE = tuple(verdict for verdict in VERDICTS if verdict != ESTABLISHED)
 
 
@@ -86,7 +94,7 @@ def summary() -> Page:
             cells = "".join(
                 f'<td class="claim-{slug(verdict)}">{n or "·"}</td>' for verdict, n in found.items()
             )
-            rows.append(f"<tr><th>{text(source)}</th><td>{threshold}</td>{cells}</tr>")
+            rows.append(f"<tr><th>{text(named(source))}</th><td>{threshold}</td>{cells}</tr>")
             lines.append(f"{source} {threshold}: {found}")
     titles = "".join(
         f'<th class="claim-{slug(v)}"><span class="claim-verdict">{v}</span></th>'
@@ -169,6 +177,10 @@ def table(style: str, head: Sequence[str], rows: Sequence[str]) -> str:
 
 def work_of(claim: Claim) -> str:
     return claim.source.split(",")[0]
+
+
+def named(work: str) -> str:
+    return NAMES.get(work, work)
 
 
 def _place(claim: Claim) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 from urllib.parse import urlencode
 
 from .ledger import OURS, PRINTED, VERDICTS, Claim, ClaimError, find, load
-from .pages import OF_A_SOURCE, Badge, Page, because, plain, rich, slug, text, work_of
+from .pages import NAMES, OF_A_SOURCE, Badge, Page, because, named, plain, rich, slug, text, work_of
 from .pages import table as table_of
 
 TITLES = {
@@ -125,7 +125,8 @@ def database() -> Page:
     ]
     told = json.dumps(rows, ensure_ascii=False).replace("<", "\\u003c")
     data = f'<script id="ledger" type="application/json">{told}</script>'
-    page = f'<div class="claims-browser"></div>{data}'
+    names = escape(json.dumps(NAMES))
+    page = f'<div class="claims-browser" data-names="{names}"></div>{data}'
     return Page(page, f"{len(rows)} claims")
 
 
@@ -140,7 +141,7 @@ def bars() -> Page:
     counts: Counter[Any] = Counter((work_of(c), c.threshold, c.verdict) for c in load().values())
     rows, lines = [], []
     for work, title in TITLES.items():
-        rows.append(f'<div class="bar-title"><b>{text(title)}</b> ({work})</div>')
+        rows.append(f'<div class="bar-title"><b>{text(title)}</b> ({text(named(work))})</div>')
         for limit in (PRINTED, OURS):
             found = {v: counts[work, limit, v] for v in OF_A_SOURCE if counts[work, limit, v]}
             if not found:

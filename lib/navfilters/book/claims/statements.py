@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from .ledger import ClaimError, find
-from .pages import Page, table
+from .pages import Page, named, table
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def statements() -> Page:
         )
         listed = f"<details><summary>open ones</summary><ul>{missing}</ul></details>"
         cells = "".join(f"<td>{n}</td>" for n in numbers)
-        rows.append(f"<tr><td>{_text(work)}{listed if missing else ''}</td>{cells}</tr>")
+        rows.append(f"<tr><td>{_text(named(work))}{listed if missing else ''}</td>{cells}</tr>")
         lines.append(f"{work}: {dict(zip(('all', *STATES), numbers, strict=True))}")
     head = ("source", "statements", *STATES)
     return Page(table("claims-listing", head, rows), "\n".join(lines))

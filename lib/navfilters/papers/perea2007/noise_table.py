@@ -80,7 +80,24 @@ def simulate(runs: int, setup: Setup, *, done: Callable[[int], Any] = bool) -> d
     }
 
 
-def table(scores: Mapping[str, Score], setup: Setup, updates: int = UPDATES[-1]) -> str:
+COLUMNS = (
+    "filter",
+    "rms / bound",
+    "median",
+    "95 %",
+    "NEES, plane",
+    "NEES, measured",
+    "outside, plane",
+    "outside, measured",
+    "NIS",
+    "lost",
+)
+"""Of :func:`rows`."""
+
+
+def rows(
+    scores: Mapping[str, Score], setup: Setup, updates: int = UPDATES[-1]
+) -> list[tuple[str, ...]]:
     """Errors over the bound, median NEES, shares outside, NIS and shares lost.
 
     Parameters
@@ -93,25 +110,44 @@ def table(scores: Mapping[str, Score], setup: Setup, updates: int = UPDATES[-1])
 
     Returns
     -------
-    str
-        A line for each. "Plane" and "measured" say in which coordinates.
+    list of tuple of str
+        One for each, as ``COLUMNS`` says. "Plane" and "measured" say in which coordinates; "–" is
+        what cannot be told.
     """
     i = UPDATES.index(updates)
     limit = bound(setup.x_true, setup.model)[i]
-    lines = [
-        f"after {updates:<10}error over the bound       median NEES    outside own 95 %    mean",
-        f"{'':13}     rms  median    95 %    plane measured    plane measured     NIS   lost",
-    ]
+    found = []
     for name, one in scores.items():
         e = one.error[i] / limit
         numbers = [np.sqrt(np.mean(e**2)), np.median(e), np.quantile(e, 0.95)]
         sound = np.isfinite(one.nees[i])
         numbers += [np.median(q[i][sound]) for q in (one.nees, one.nees_measured) if sound.any()]
         outside = [np.mean(~(q[i] < EDGE)) for q in (one.nees, one.nees_measured)]
-        text = [f"{value:.2g}" for value in numbers] + ["-"] * (5 - len(numbers))
+        text = [f"{value:.2g}" for value in numbers] + ["–"] * (5 - len(numbers))
         text += [f"{share:.0%}" for share in outside]
-        text += [f"{np.mean(one.nis[i]):.2g}" if np.isfinite(one.nis[i]).all() else "-"]
-        text += [f"{np.mean(one.lost[i]):.0%}"]
-        widths = (8, 8, 8, 9, 9, 9, 9, 8, 7)
+        text += [f"{np.mean(one.nis[i]):.2g}" if np.isfinite(one.nis[i]).all() else "–"]
+        found.append((name, *text, f"{np.mean(one.lost[i]):.0%}"))
+    return found
+
+
+def table(scores: Mapping[str, Score], setup: Setup, updates: int = UPDATES[-1]) -> str:
+    """The same for a terminal.
+
+    Parameters
+    ----------
+    scores, setup, updates
+        As of :func:`rows`.
+
+    Returns
+    -------
+    str
+        A line for each.
+    """
+    lines = [
+        f"after {updates:<10}error over the bound       median NEES    outside own 95 %    mean",
+        f"{'':13}     rms  median    95 %    plane measured    plane measured     NIS   lost",
+    ]
+    widths = (8, 8, 8, 9, 9, 9, 9, 8, 7)
+    for name, *text in rows(scores, setup, updates):
         lines.append(f"{name:13}" + "".join(t.rjust(w) for t, w in zip(text, widths, strict=True)))
     return "\n".join(lines)
