@@ -15,6 +15,8 @@ from fontTools import subset
 from PIL import Image
 from sphinx.application import Sphinx
 
+from navfilters.book.claims.pages import named
+
 ICON = re.compile(r'"?([\w-]+)"?:\[(\d+),(\d+),\[([^\]]*)\],"[0-9a-f]+","([^"]*)"\]')
 NAMED = re.compile(r"\bfa-([a-z][a-z0-9-]*)")
 BY_FONT = re.compile(r'(?:\.fa-[\w-]+:before,?)+\{content:"[^"]*"\}')
@@ -136,7 +138,7 @@ def mend(page: Path) -> None:
 
 def _both_numbers(found: re.Match) -> str:
     """Our number of an equation, and the source's."""
-    source = f'<span class="eqno-source">{found[2]} {_numbers(found[3])}</span>'
+    source = f'<span class="eqno-source">{named(found[2])} {_numbers(found[3])}</span>'
     return f"{found[1]}{source} {found[4]}"
 
 

@@ -21,9 +21,9 @@ def test_fields_of_named_tuples_are_left_out():
 @pytest.mark.parametrize(
     ("label", "numbers"),
     [
-        ("perea2007-10-to-12", "perea2007 (10)–(12)"),
-        ("xiong2009-27-47", "xiong2009 (27), (47)"),
-        ("xiong2009-a14", "xiong2009 (A.14)"),
+        ("perea2007-10-to-12", "Perea et al. 2007 (10)–(12)"),
+        ("xiong2009-27-47", "Xiong et al. 2009 (27), (47)"),
+        ("xiong2009-a14", "Xiong et al. 2009 (A.14)"),
     ],
 )
 def test_an_equation_has_our_number_and_the_sources(tmp_path, label, numbers):

@@ -88,13 +88,17 @@ def summary() -> Page:
     counts = Counter((work_of(c), c.threshold, c.verdict) for c in ledger)
     rows, lines = [], []
     for source in dict.fromkeys(work_of(c) for c in ledger):
-        for threshold in _thresholds(ledger, source):
+        limits = _thresholds(ledger, source)
+        heading = f'<th rowspan="{len(limits)}">{text(named(source))}</th>'
+        for threshold in limits:
             found = {verdict: counts[source, threshold, verdict] for verdict in OF_A_SOURCE}
             found["all"] = sum(found.values())
             cells = "".join(
                 f'<td class="claim-{slug(verdict)}">{n or "·"}</td>' for verdict, n in found.items()
             )
-            rows.append(f"<tr><th>{text(named(source))}</th><td>{threshold}</td>{cells}</tr>")
+            limit = f'<td class="claims-limit">{threshold}</td>'
+            rows.append(f"<tr>{heading}{limit}{cells}</tr>")
+            heading = ""
             lines.append(f"{source} {threshold}: {found}")
     titles = "".join(
         f'<th class="claim-{slug(v)}"><span class="claim-verdict">{v}</span></th>'
