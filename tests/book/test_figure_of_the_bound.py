@@ -104,6 +104,7 @@ def test_it_takes_the_place_of_its_picture(page):
     page.emulate_media(media="screen")
 
 
+@pytest.mark.alone
 def test_it_is_drawn_at_thirty_frames_a_second(page):
     took = page.evaluate("""() => {
         const { figure } = document.querySelector('[data-figure=bound] .stage');

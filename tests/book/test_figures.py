@@ -112,6 +112,7 @@ def test_a_pointer_drags_the_start(browser):
         )
 
 
+@pytest.mark.alone
 def test_playing_runs_all_updates_at_thirty_frames_a_second(browser):
     with browser.visit(DIVERGENCE) as visit:
         page = visit.page
