@@ -87,6 +87,8 @@ def vector(elements: list[Array]) -> Array:
         With the members innermost in memory.
     """
     xp = elements[0].__array_namespace__()
+    if xp is np and elements[0].ndim == 0:
+        return np.array(elements)  # of single numbers it takes a fifth of the time
     v = xp.stack(elements)
     return xp.permute_dims(v, (*range(1, v.ndim), 0))
 

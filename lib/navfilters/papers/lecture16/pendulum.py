@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 from navfilters.estimators.continuous import ContinuousSystem, Reference, Signal
 from navfilters.estimators.discrete import DiscreteSystem
-from navfilters.numerics.small_matrices import matrix
+from navfilters.numerics.small_matrices import matrix, vector
 from navfilters.types import Array, Gaussian
 
 
@@ -122,7 +122,7 @@ class Setup:
         xp = x.__array_namespace__()
         angle, rate = x[..., 0], x[..., 1]
         pull = (self.gravity + w[..., 1]) * xp.sin(angle) + w[..., 0] * xp.cos(angle)
-        return xp.stack([rate, u[..., 0] - self.damping * rate - pull / self.length], axis=-1)
+        return vector([rate, u[..., 0] - self.damping * rate - pull / self.length])
 
     def A(self, x: Array, u: Array, w: Array, t: float) -> Array:
         """df/dx, (..., 2, 2)."""
@@ -148,8 +148,7 @@ class Setup:
 
     def h(self, x: Array, v: Array, t: float) -> Array:
         """y = range (1 + v), (..., 1), m; v (..., 1) is the error as a fraction of the range."""
-        xp = x.__array_namespace__()
-        return xp.stack([self.range(x) * (1 + v[..., 0])], axis=-1)
+        return (self.range(x) * (1 + v[..., 0]))[..., None]
 
     def C(self, x: Array, v: Array, t: float) -> Array:
         """dh/dx, (..., 1, 2)."""
@@ -225,8 +224,11 @@ def band_limited_noise(
     waves = rng.standard_normal((2 * count, len(root))) * root * np.sqrt(2 / duration)
 
     def noise(t):
-        phase = rates * np.asarray(t)[..., None]
-        return np.concatenate([np.cos(phase), np.sin(phase)], axis=-1) @ waves
+        phase = np.multiply.outer(t, rates)
+        both = np.empty((*phase.shape[:-1], 2 * count))
+        np.cos(phase, out=both[..., :count])
+        np.sin(phase, out=both[..., count:])
+        return both @ waves
 
     return noise
 
