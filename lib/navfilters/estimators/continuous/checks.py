@@ -46,7 +46,11 @@ def checked_signal(name: str, value: Any, t0: float, size: int | None) -> Signal
 
     def checked(s):
         array = np.asarray(validation.plain(name, value(s)))
-        if array.shape != wanted or array.dtype.kind not in "iuf" or not all(map(isfinite, array.tolist())):
+        if (
+            array.shape != wanted
+            or array.dtype.kind not in "iuf"
+            or not all(map(isfinite, array.tolist()))
+        ):
             found = array if array.shape == wanted else f"shape {array.shape}"
             size = ", ".join(map(str, wanted))
             raise ValueError(
