@@ -7,7 +7,8 @@ import numpy as np
 
 from navfilters.numerics import validation
 from navfilters.numerics.loops import is_jax
-from navfilters.numerics.runge_kutta import runge_kutta
+from navfilters.numerics.runge_kutta import runge_kutta, runge_kutta_increment
+from navfilters.numerics.whole_paths import whole_path
 from navfilters.space.gravity import EARTH, Gravity
 from navfilters.types import Array
 
@@ -187,13 +188,16 @@ class EarthFixedOrbit:
         array (steps + 1, ..., 6)
             The first is x.
         """
-        xp = x.__array_namespace__()
-        if not is_jax(xp):  # components first in memory: the loops run over the members
-            x = np.moveaxis(np.moveaxis(x, -1, 0).copy(), 0, -1)
+        if self.integrator == "rk4":
+            longest = int(0.13 / ((self.gravity.fastest + abs(self.rate)) * self.step))
+            return whole_path(self._increment, x, self.step, steps, longest)
         path = [x]
         for _ in range(steps):
             path.append(self.advance(path[-1]))
-        return xp.stack(path)
+        return x.__array_namespace__().stack(path)
+
+    def _increment(self, _: Array | slice, x: Array, h: float) -> Array:
+        return runge_kutta_increment(self.derivative, x, h)
 
     def transitions(self, path: Array) -> Array:
         """F: derivative of each error of a path with respect to that one step before.
