@@ -167,21 +167,14 @@ def truth(times):
 # --- filter
 def difference(f, steps):
     """Jacobian of f at 0 by fourth-order central differences with the given step per component."""
-    columns = []
-    for i, h in enumerate(steps):
-        d = np.zeros(len(steps))
-        d[i] = h
-        columns.append((8 * (f(d) - f(-d)) - (f(2 * d) - f(-2 * d))) / (12 * h))
-    return np.array(columns).T
+    return difference_at_once(lambda points: np.array([f(d) for d in points]), steps)
 
 
 def difference_at_once(f, steps):
     """The same of an f that takes many points, one a row, and gives a row for each."""
     d = np.diag(steps)
-    f_d, f_less, f_two, f_less_two = f(np.concatenate([d, -d, 2 * d, -2 * d])).reshape(
-        4, len(d), -1
-    )
-    return ((8 * (f_d - f_less) - (f_two - f_less_two)) / (12 * np.array(steps)[:, None])).T
+    f1, f2, f3, f4 = f(np.concatenate([d, -d, 2 * d, -2 * d])).reshape(4, len(d), -1)
+    return ((8 * (f1 - f2) - (f3 - f4)) / (12 * np.array(steps)[:, None])).T
 
 
 def ecef_rate(x):
