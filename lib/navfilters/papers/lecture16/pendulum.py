@@ -18,9 +18,6 @@ from navfilters.estimators.discrete import DiscreteSystem
 from navfilters.numerics.small_matrices import matrix, vector
 from navfilters.types import Array, Gaussian
 
-AT_A_TIME = 1000
-"""Times worked on together: enough to amortise a call, few enough for the cache."""
-
 
 @dataclass(frozen=True)
 class Setup:
@@ -78,6 +75,10 @@ class Setup:
     deviation: tuple[float, float] = (0.1, 0.1)
     duration: float = 20.0
 
+    def __post_init__(self) -> None:
+        for name in ("sensor", "shaking", "guess", "deviation"):  # lists too: a set-up is a key
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+
     @property
     def prior(self) -> Gaussian:
         """The filters' first estimate."""
@@ -124,8 +125,7 @@ class Setup:
         array (..., 2)
         """
         xp = x.__array_namespace__()
-        angle, rate = component(x, 0), component(x, 1)
-        aside, up = component(w, 0), component(w, 1)
+        angle, rate, aside, up = (component(a, i) for a in (x, w) for i in (0, 1))
         pull = (self.gravity + up) * xp.sin(angle) + aside * xp.cos(angle)
         return vector([rate, component(u, 0) - self.damping * rate - pull / self.length])
 
@@ -170,8 +170,7 @@ class Setup:
     def reference(self) -> Reference:
         """The planned motion: released at rest from ``planned``, driven by u(t), no noise."""
         still = np.zeros(2)
-        x = _motion(self, self.planned, lambda t: still)
-        return Reference(x, self.control)
+        return Reference(_motion(self, self.planned, lambda t: still), self.control)
 
     def experiment(self, seed: int) -> tuple[Signal, Signal]:
         """One shaken pendulum and what the range finder says of it.
@@ -191,7 +190,6 @@ class Setup:
 
 @lru_cache(maxsize=64)
 def _experiment(setup: Setup, seed: int) -> tuple[Signal, Signal]:
-    """As ``Setup.experiment``; computed once for each set-up and seed."""
     rng = np.random.default_rng(seed)
     w = band_limited_noise(rng, np.array(setup.shaking), setup.bandwidth, setup.duration)
     v = band_limited_noise(rng, np.array([setup.ranging]), setup.bandwidth, setup.duration)
@@ -205,10 +203,8 @@ def _motion(setup: Setup, angle: float, w: Signal) -> Signal:
     def rate(t, x):
         return setup.f(x, setup.control(t), w(t), t)
 
-    span = 0.0, setup.duration
-    x = solve_ivp(
-        rate, span, [angle, 0.0], method="DOP853", dense_output=True, rtol=1e-10, atol=1e-10
-    ).sol
+    fine = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-10, "dense_output": True}
+    x = solve_ivp(rate, (0.0, setup.duration), [angle, 0.0], **fine).sol
     return lambda t: x(t).T
 
 
@@ -301,5 +297,4 @@ def sampled(signal: Callable[[Any], Array], times: Array) -> Array:
     -------
     array (K, m)
     """
-    parts = np.split(times, range(AT_A_TIME, len(times), AT_A_TIME))
-    return np.concatenate([signal(part) for part in parts])
+    return signal(times)
