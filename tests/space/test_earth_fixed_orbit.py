@@ -228,6 +228,15 @@ def test_the_same_source_compiles_under_jax():
     assert_allclose(got[1], wanted[1], rtol=1e-10, atol=1e-9)
 
 
+@pytest.mark.parametrize("integrator", ["rk4", "printed"])
+def test_transitions_by_elements_are_the_series_of_the_jacobian(integrator):
+    dynamics = EarthFixedOrbit(step=8.0, integrator=integrator)
+    path = dynamics.path(states(), 3)
+    wanted = np.asarray(dynamics.transitions(jnp.asarray(path)))  # JAX multiplies the matrices
+    got = dynamics.transitions(path)
+    assert_allclose(got * SCALE / SCALE[:, None], wanted * SCALE / SCALE[:, None], rtol=1e-13)
+
+
 def test_noise_may_be_a_batch():
     many = Q_PSD * np.array([1.0, 4.0])[:, None, None]
     _, P = EarthFixedOrbit(Q_psd=many).propagate(HOUSTON, 0 * P0, 4)

@@ -87,6 +87,8 @@ def vector(elements: list[Array]) -> Array:
         With the members innermost in memory.
     """
     xp = elements[0].__array_namespace__()
+    if xp is np and elements[0].ndim == 0:
+        return np.array(elements)  # of single numbers it takes a fifth of the time
     v = xp.stack(elements)
     return xp.permute_dims(v, (*range(1, v.ndim), 0))
 
@@ -228,6 +230,8 @@ def _solve(A: Array, B: Array) -> Array:
     """A^-1 B for a stack, by Gauss-Jordan elimination with partial pivoting."""
     xp, m = A.__array_namespace__(), A.shape[-1]
     batch = xp.broadcast_shapes(A.shape[:-2], B.shape[:-2])
+    if xp is np:
+        return _by_elements(A, B, batch, m)
     work = xp.concat([xp.broadcast_to(X, (*batch, *X.shape[-2:])) for X in (A, B)], axis=-1)
     rows = xp.arange(m)
     for j in range(m):
@@ -238,6 +242,24 @@ def _solve(A: Array, B: Array) -> Array:
         row = (work[..., j, :] / work[..., j, j, None])[..., None, :]
         work = xp.where((rows == j)[:, None], row, work - work[..., :, j, None] * row)
     return work[..., :, m:]
+
+
+def _by_elements(A: np.ndarray, B: np.ndarray, batch: tuple[int, ...], m: int) -> np.ndarray:
+    """The same under NumPy: each element over all members, and none that is not needed again."""
+    work = np.empty((m, m + B.shape[-1], *batch), np.result_type(A, B))
+    for part, X in ((work[:, :m], A), (work[:, m:], B)):
+        part[...] = np.moveaxis(np.broadcast_to(X, (*batch, *X.shape[-2:])), (-2, -1), (0, 1))
+    for j in range(m):
+        pivot = j + np.argmax(np.abs(work[j:, j]), axis=0)
+        for i in range(j + 1, m):
+            if (swap := pivot == i).any():
+                one, other = work[j, j:].copy(), work[i, j:]
+                work[j, j:] = np.where(swap, other, one)
+                work[i, j:] = np.where(swap, one, other)
+        work[j, j + 1 :] /= work[j, j]
+        for i in {*range(m)} - {j}:
+            work[i, j + 1 :] -= work[i, j] * work[j, j + 1 :]
+    return np.ascontiguousarray(np.moveaxis(work[:, m:], (0, 1), (-2, -1)))
 
 
 def spectral_norm(A: Array) -> Array:

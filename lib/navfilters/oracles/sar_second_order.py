@@ -65,10 +65,11 @@ def _interval(before: Any, at: Any) -> Interval:
         return np.concatenate([*flown], axis=1)[0]
 
     def h(e):
-        return again.measure(r + e[:3], v + e[3:6], again.misalignment(e[6:]), pixel, T)
+        T_mu = again.misalignment(e[:, 6:])
+        return again.measure(r + e[:, :3], v + e[:, 3:6], T_mu, pixel, T)
 
     def slope(e):
-        return again.difference(lambda more: h(e + more), STEPS).ravel()
+        return again.difference_at_once(lambda more: h(e + more), STEPS).ravel()
 
     F[:6, :6] = again.difference(fly_on, STEPS[:6])
     Q = again.predict(before[0], before[1], np.eye(3), np.zeros((9, 9)), again.INTERVAL)[3]

@@ -41,13 +41,17 @@ CASES = {
 }
 
 
+ALONG = np.array([1.0, 1.0, 3.0])
+W = OMEGA * np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+
+
 # --- motion
 def gravity(r):
     """Two-body + J2 acceleration; the same in ECEF and inertial axes (it is symmetric about z)."""
     d = np.sqrt(r @ r)
     s = (r[2] / d) ** 2
     k = 1.5 * J2 * (RE / d) ** 2
-    return -GM / d**3 * r * (1 + k * (np.array([1.0, 1.0, 3.0]) - 5 * s))
+    return -GM / d**3 * r * (1 + k * (ALONG - 5 * s))
 
 
 def spin(angle):
@@ -163,19 +167,20 @@ def truth(times):
 # --- filter
 def difference(f, steps):
     """Jacobian of f at 0 by fourth-order central differences with the given step per component."""
-    columns = []
-    for i, h in enumerate(steps):
-        d = np.zeros(len(steps))
-        d[i] = h
-        columns.append((8 * (f(d) - f(-d)) - (f(2 * d) - f(-2 * d))) / (12 * h))
-    return np.array(columns).T
+    return difference_at_once(lambda points: np.array([f(d) for d in points]), steps)
+
+
+def difference_at_once(f, steps):
+    """The same of an f that takes many points, one a row, and gives a row for each."""
+    d = np.diag(steps)
+    f1, f2, f3, f4 = f(np.concatenate([d, -d, 2 * d, -2 * d])).reshape(4, len(d), -1)
+    return ((8 * (f1 - f2) - (f3 - f4)) / (12 * np.array(steps)[:, None])).T
 
 
 def ecef_rate(x):
     """d(r, v)/dt in ECEF from the inertial motion, without writing the fictitious forces out:
     the velocity relative to turning axes is v_i - w x r, and its components turn with the axes."""
     r, v = x[:3], x[3:]
-    W = OMEGA * np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     vi = v + W @ r
     return np.concatenate([vi - W @ r, gravity(r) - W @ vi - W @ v])
 
@@ -196,18 +201,21 @@ def predict(r, v, T_mu, P, dt, substeps=4):
 
 
 def measure(r, v, T_mu, r_f, T_es):
-    """h(x): the two antenna-frame ratios, the slant range and the ECEF speed."""
-    x, y, z = T_mu @ T_es @ (r_f - r)
-    return np.array([x / z, y / z, np.sqrt(np.sum((r_f - r) ** 2)), np.sqrt(v @ v)])
+    """h(x): the two antenna-frame ratios, the slant range and the ECEF speed; many in rows."""
+    d = r_f - r
+    s = (T_mu @ T_es @ d[..., None])[..., 0]
+    speed = np.broadcast_to(np.sqrt(np.vecdot(v, v)), d.shape[:-1])
+    rows = s[..., 0] / s[..., 2], s[..., 1] / s[..., 2], np.sqrt(np.sum(d**2, axis=-1)), speed
+    return np.stack(rows, axis=-1)
 
 
 def jacobians(r, v, T_mu, r_f, T_es):
     """H (4 x 9, with respect to dr, dv, dmu) and H_f (4 x 3, with respect to the feature)."""
-    H = difference(
-        lambda d: measure(r + d[:3], v + d[3:6], misalignment(d[6:]) @ T_mu, r_f, T_es),
+    H = difference_at_once(
+        lambda d: measure(r + d[:, :3], v + d[:, 3:6], misalignment(d[:, 6:]) @ T_mu, r_f, T_es),
         [100.0] * 3 + [1.0] * 3 + [1e-4] * 3,
     )
-    H_f = difference(lambda d: measure(r, v, T_mu, r_f + d, T_es), [100.0] * 3)
+    H_f = difference_at_once(lambda d: measure(r, v, T_mu, r_f + d, T_es), [100.0] * 3)
     return H, H_f
 
 

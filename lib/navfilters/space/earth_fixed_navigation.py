@@ -4,11 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-import numpy as np
-
 from navfilters.numerics import validation
 from navfilters.numerics.loops import is_jax, repeat
-from navfilters.space.earth_fixed_orbit import TURN, EarthFixedOrbit
+from navfilters.space.earth_fixed_orbit import TURN, EarthFixedOrbit, padded
 from navfilters.space.pose import difference, retract
 from navfilters.space.variations import forwards, rates, series, to_end
 from navfilters.types import Array
@@ -80,7 +78,7 @@ class EarthFixedNavigation:
             flown, F = forwards(self._step, x[..., :6], self.steps, 9)
             return self._with_attitude(flown, x), F
         flown, derivatives = self._to_end(x)
-        return self._with_attitude(flown, x), _padded(derivatives[-1])
+        return self._with_attitude(flown, x), padded(derivatives[-1])
 
     def propagate(self, x: Array, Q: Array) -> tuple[Array, Array, Array]:
         """The same, and the covariance at the end of a noise that enters after every step.
@@ -107,7 +105,7 @@ class EarthFixedNavigation:
             flown, F, W = forwards(self._step, x[..., :6], self.steps, 9, Q)
             return self._with_attitude(flown, x), F, W
         flown, (*of_noise, F) = self._to_end(x)
-        F = _padded(F)
+        F = padded(F)
         W = self.steps * Q + 0 * F
         W[..., :6, :6] = sum(Phi @ Q[..., :6, :6] @ Phi.mT for Phi in of_noise)
         W[..., :6, 6:] = sum(of_noise) @ Q[..., :6, 6:]
@@ -123,7 +121,7 @@ class EarthFixedNavigation:
     def _to_end(self, x: Array) -> tuple[Array, list[Array]]:
         """The last position and velocity, and its derivatives by each, from last to first."""
         path = self.orbit.path(x[..., :6], self.steps)
-        parts = to_end(lambda _, part: self.orbit.transitions(part)[..., :6, :6], path, 6)
+        parts = to_end(lambda _, part: self.orbit.flight_transitions(part), path, 6)
         return path[-1], list(parts)
 
     def _step(self, k: Array, x: Array) -> tuple[Array, Callable[..., Array]]:
@@ -142,10 +140,3 @@ class EarthFixedNavigation:
             return M + step + xp.concat([bend[..., :3, :], 0 * bend[..., 3:, :]], axis=-2)
 
         return x_next, grow
-
-
-def _padded(F: Array) -> Array:
-    """(..., 9, 9) of (..., 6, 6): the misalignment stays."""
-    whole = np.zeros((*F.shape[:-2], 9, 9), F.dtype) + np.eye(9)
-    whole[..., :6, :6] = F
-    return whole

@@ -6,7 +6,9 @@ from typing import Literal
 import numpy as np
 
 from navfilters.numerics import validation
-from navfilters.numerics.runge_kutta import runge_kutta
+from navfilters.numerics.loops import is_jax
+from navfilters.numerics.runge_kutta import runge_kutta, runge_kutta_increment
+from navfilters.numerics.whole_paths import whole_path
 from navfilters.space.gravity import EARTH, Gravity
 from navfilters.types import Array
 
@@ -99,14 +101,7 @@ class EarthFixedOrbit:
         ----------
         pogorelsky2020, Eqs. (8) and (9) with a_b = 0.
         """
-        xp = x.__array_namespace__()
-        w, r, v = self.rate, x[..., :3], x[..., 3:]
-        turning = [
-            w * (w * r[..., 0] + 2 * v[..., 1]),
-            w * (w * r[..., 1] - 2 * v[..., 0]),
-            xp.zeros_like(r[..., 2]),
-        ]
-        return self.gravity.acceleration(r) + xp.stack(turning, axis=-1)
+        return self.derivative(x)[..., 3:]
 
     def derivative(self, x: Array) -> Array:
         """dx/dt = (v, dv/dt).
@@ -120,8 +115,17 @@ class EarthFixedOrbit:
         -------
         array (..., 6)
         """
-        xp = x.__array_namespace__()
-        return xp.concat([x[..., 3:], self.acceleration(x)], axis=-1)
+        xp, w = x.__array_namespace__(), self.rate
+        pull, twice, turned = self.gravity.acceleration(x[..., :3]), 2 * x[..., 3:5], w * x[..., :2]
+        of_x, of_y = w * (turned[..., 0] + twice[..., 1]), w * (turned[..., 1] - twice[..., 0])
+        if is_jax(xp):
+            turning = xp.stack([of_x, of_y, xp.zeros_like(of_x)], axis=-1)
+            return xp.concat([x[..., 3:], pull + turning], axis=-1)
+        dx = np.empty_like(x)  # in memory as x is
+        dx[..., :3], dx[..., 3:] = x[..., 3:], pull
+        dx[..., 3] += of_x
+        dx[..., 4] += of_y
+        return dx
 
     def jacobian(self, x: Array) -> Array:
         """A: how the errors in position, velocity and misalignment grow.
@@ -184,10 +188,16 @@ class EarthFixedOrbit:
         array (steps + 1, ..., 6)
             The first is x.
         """
+        if self.integrator == "rk4":
+            longest = int(0.13 / ((self.gravity.fastest + abs(self.rate)) * self.step))
+            return whole_path(self._increment, x, self.step, steps, longest)
         path = [x]
         for _ in range(steps):
             path.append(self.advance(path[-1]))
         return x.__array_namespace__().stack(path)
+
+    def _increment(self, _: Array | slice, x: Array, h: float) -> Array:
+        return runge_kutta_increment(self.derivative, x, h)
 
     def transitions(self, path: Array) -> Array:
         """F: derivative of each error of a path with respect to that one step before.
@@ -202,6 +212,8 @@ class EarthFixedOrbit:
         array (k, ..., 9, 9)
         """
         xp = path.__array_namespace__()
+        if not is_jax(xp):
+            return padded(self.flight_transitions(path))
         h, x = self.step, path[:-1]
         if self.integrator == "printed":
             hA = h * self.jacobian(x)
@@ -209,6 +221,45 @@ class EarthFixedOrbit:
             return xp.eye(9) + hA + bend
         hA = h * self.jacobian((x + path[1:]) / 2)
         return xp.eye(9) + hA + hA @ hA / 2
+
+    def flight_transitions(self, path: Array) -> Array:
+        """The same of position and velocity alone, under NumPy.
+
+        Parameters
+        ----------
+        path : array (k + 1, ..., 6)
+            States one step apart.
+
+        Returns
+        -------
+        array (k, ..., 6, 6)
+        """
+        h, printed, x = self.step, self.integrator == "printed", path[:-1]
+        at = x if printed else (x + path[1:]) / 2
+        # h A = [0, h I; G, V], V = [0, c, 0; -c, 0, 0; 0, 0, 0]. By elements: each is an array
+        # over steps and members, which are many.
+        G = np.moveaxis(self.gravity.gradient(at[..., :3]), (-2, -1), (0, 1)).copy()
+        c = h * (2 * self.rate)
+        G[0, 0] += self.rate**2
+        G[1, 1] += self.rate**2
+        G *= h
+        bend = (h / 2) * G
+        F = np.empty((6, 6, *G.shape[2:]), G.dtype)
+        F[:3, :3], F[:3, 3:], F[3:, :3], F[3:, 3:] = bend, 0, G, 0
+        F[0, 4], F[1, 3] = h * c / 2, -h * c / 2
+        if not printed:
+            F[3, :3] += (c / 2) * G[1]
+            F[4, :3] -= (c / 2) * G[0]
+            F[3:, 3:] = bend
+            F[3, 3] -= c * c / 2
+            F[4, 4] -= c * c / 2
+        F[3, 4] += c
+        F[4, 3] -= c
+        for i in range(3):
+            F[i, i] += 1
+            F[3 + i, 3 + i] += 1
+            F[i, 3 + i] += h
+        return np.ascontiguousarray(np.moveaxis(F, (0, 1), (-2, -1)))
 
     def propagate(self, x: Array, P: Array, steps: int) -> tuple[Array, Array]:
         """A state and its covariance, so many steps later.
@@ -240,3 +291,10 @@ class EarthFixedOrbit:
 POSITION, VELOCITY = np.eye(9)[:3], np.eye(9)[3:6]
 
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # [w x] of a unit w
+
+
+def padded(F: Array) -> Array:
+    """Of position, velocity and misalignment, (..., 9, 9): F (..., 6, 6), and the last stays."""
+    whole = np.zeros((*F.shape[:-2], 9, 9), F.dtype) + np.eye(9)
+    whole[..., :6, :6] = F
+    return whole

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from navfilters.numerics import validation
+from navfilters.numerics.loops import is_jax
 from navfilters.types import Array
 
 
@@ -60,15 +61,20 @@ class Gravity:
         xiong2009, Eq. (36), rows 4 to 6.
         """
         xp = r.__array_namespace__()
-        # By components: nothing but r has a third axis, and its layout in memory is the result's.
         x, y, z = r[..., 0], r[..., 1], r[..., 2]
         z2 = z * z
         s = 1 / (x * x + y * y + z2)
         of_sphere = (-self.mu * s) * xp.sqrt(s)
         of_J2 = (self._k * s) * of_sphere
         along = of_sphere + of_J2 * (1 - (5 * s) * z2)
-        upwards = xp.reshape(xp.asarray(2 * AXIS), (3, *(1,) * z.ndim)) * of_J2
-        return r * xp.permute_dims(along + upwards, (*range(1, r.ndim), 0))
+        if is_jax(xp):
+            return xp.stack([x * along, y * along, z * (along + 2 * of_J2)], axis=-1)
+        pull = np.empty_like(r)  # in memory as r is
+        np.multiply(x, along, out=pull[..., 0])
+        np.multiply(y, along, out=pull[..., 1])
+        along += 2 * of_J2
+        np.multiply(z, along, out=pull[..., 2])
+        return pull
 
     def gradient(self, r: Array) -> Array:
         """Derivative of the acceleration with respect to position: the gravity gradient.
@@ -89,17 +95,22 @@ class Gravity:
         """
         xp = r.__array_namespace__()
         x, y, z = r[..., 0], r[..., 1], r[..., 2]
-        s = (1 / (x * x + y * y + z * z))[..., None]
-        u = r * xp.sqrt(s)  # unit vector
-        c = u[..., 2:]
-        size, k = self.mu * s * xp.sqrt(s), self._k * s
-        n = xp.asarray(AXIS)
-        of_u = (size * (3 + k * (5 - 35 * c * c))) * u
-        of_n = (size * k) * (10 * c * u - n)
-        of_I = (size * (k * (5 * c * c - 1) - 1))[..., None]
-        G = of_u[..., :, None] * u[..., None, :] + of_I * xp.eye(3)
-        along_n = of_n[..., :, None] * n
-        return G + (along_n + along_n.mT)
+        s = 1 / (x * x + y * y + z * z)
+        to_one = xp.sqrt(s)
+        u, v, c = x * to_one, y * to_one, z * to_one  # unit vector
+        size, k = self.mu * s * to_one, self._k * s
+        of_u = size * (3 + k * (5 - 35 * c * c))
+        of_x, of_y, of_z = of_u * u, of_u * v, of_u * c
+        across, tilt = size * k, 10 * c
+        up_x, up_y, up_z = across * (tilt * u), across * (tilt * v), across * (tilt * c - 1)
+        same = size * (k * (5 * c * c - 1) - 1)
+        rows = [
+            [of_x * u + same, of_x * v, of_x * c + up_x],
+            [of_y * u, of_y * v + same, of_y * c + up_y],
+            [of_z * u + up_x, of_z * v + up_y, of_z * c + same + (up_z + up_z)],
+        ]
+        G = xp.stack([element for row in rows for element in row], axis=-1)
+        return xp.reshape(G, (*x.shape, 3, 3))
 
     @property
     def fastest(self) -> float:
@@ -111,5 +122,4 @@ class Gravity:
         return 1.5 * self.J2 * self.radius**2
 
 
-AXIS = np.array([0.0, 0.0, 1.0])
 EARTH = Gravity()

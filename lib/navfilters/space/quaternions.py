@@ -32,8 +32,8 @@ def cross_matrix(v: Array) -> Array:
     xp = v.__array_namespace__()
     x, y, z = v[..., 0], v[..., 1], v[..., 2]
     o = xp.zeros_like(x)
-    rows = [[o, -z, y], [z, o, -x], [-y, x, o]]
-    return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
+    elements = xp.stack([o, -z, y, z, o, -x, -y, x, o], axis=-1)
+    return xp.reshape(elements, (*x.shape, 3, 3))
 
 
 def product(p: Array, q: Array) -> Array:
@@ -116,10 +116,16 @@ def matrix(q: Array) -> Array:
     pogorelsky2020, Eq. (6), where q_s in the last term is printed as a vector.
     """
     xp = q.__array_namespace__()
-    v, s = q[..., :3], q[..., 3, None, None]
-    scalar = s * s - dot(v, v)[..., None, None]
-    outer = v[..., :, None] * v[..., None, :]
-    return scalar * xp.eye(3) + 2 * outer - 2 * s * cross_matrix(v)
+    x, y, z, s = (q[..., i] for i in range(4))
+    same = s * s - dot(q[..., :3], q[..., :3])
+    xy, yz, zx = 2 * (x * y), 2 * (y * z), 2 * (z * x)
+    a, b, c = 2 * s * x, 2 * s * y, 2 * s * z
+    elements = [
+        *(same + 2 * (x * x), xy + c, zx - b),
+        *(xy - c, same + 2 * (y * y), yz + a),
+        *(zx + b, yz - a, same + 2 * (z * z)),
+    ]
+    return xp.reshape(xp.stack(elements, axis=-1), (*x.shape, 3, 3))
 
 
 def from_rotation_vector(theta: Array) -> Array:

@@ -1,6 +1,7 @@
 """What a Kalman-Bucy filter is given, checked: errors name the argument and the time."""
 
 from collections.abc import Iterable
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -49,7 +50,11 @@ def checked_signal(name: str, value: Any, t0: float, size: int | None) -> Signal
 
     def checked(s: float) -> np.ndarray:
         array = np.asarray(validation.plain(name, value(s)))
-        if array.shape != wanted or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+        if (
+            array.shape != wanted
+            or array.dtype.kind not in "iuf"
+            or not all(map(isfinite, array.tolist()))
+        ):
             found = array if array.shape == wanted else f"shape {array.shape}"
             size = ", ".join(map(str, wanted))
             raise ValueError(

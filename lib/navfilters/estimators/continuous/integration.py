@@ -50,23 +50,26 @@ def integrate(
     """Mean and Riccati equation together; origin(t) is added to the mean afterwards: Eq. (30)."""
     n = start.mean.size
     upper = np.triu_indices(n)
+    places = np.empty((n, n), int)
+    places[upper] = places.T[upper] = np.arange(n, n + len(upper[0]))
 
     def unpack(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        P = np.empty((*state.shape[:-1], n, n))
-        P[..., upper[0], upper[1]] = P[..., upper[1], upper[0]] = state[..., n:]
-        return state[..., :n], P
+        return state[..., :n], state.take(places, axis=-1)
 
     def rate(s: float, state: np.ndarray) -> np.ndarray:
         x, P = unpack(state)
         drift, innovation, A, L, C, M = model(s, x)
-        try:
-            root = np.linalg.cholesky(M @ system.R @ M.T)
-        except np.linalg.LinAlgError:
-            raise ValueError(
-                "M R M^T, from system.M and system.R, must be positive definite; found "
-                f"{(M @ system.R @ M.T).tolist()} at t = {s:.6g}"
-            ) from None
-        whitened = np.linalg.solve(root, np.column_stack([C, innovation]))
+        seen, noise = np.concatenate([C, innovation[:, None]], axis=1), M @ system.R @ M.T
+        if noise.size == 1 and noise[0, 0] > 0:
+            whitened = seen * (1 / np.sqrt(noise))  # what LAPACK does, without its calls
+        else:
+            try:
+                whitened = np.linalg.solve(np.linalg.cholesky(noise), seen)
+            except np.linalg.LinAlgError:
+                raise ValueError(
+                    "M R M^T, from system.M and system.R, must be positive definite; found "
+                    f"{noise.tolist()} at t = {s:.6g}"
+                ) from None
         G = whitened[:, :-1] @ P  # G^T G = P C^T R~^-1 C P
         AP = A @ P
         P_dot = AP + AP.T - G.T @ G + L @ system.Q @ L.T

@@ -97,7 +97,8 @@ def linearized_kalman_bucy(
     A, B, L, C, M = (system.jacobian(name) for name in "ABLCM")
 
     def model(s: float, x: np.ndarray) -> tuple[np.ndarray, ...]:
-        at, sensing = (x_ref(s), u_ref(s), w_ref(s), s), (x_ref(s), v_ref(s), s)
+        known = x_ref(s)
+        at, sensing = (known, u_ref(s), w_ref(s), s), (known, v_ref(s), s)
         A_s, L_s, C_s, M_s = A(*at), L(*at), C(*sensing), M(*sensing)
         drift = A_s @ x - L_s @ at[2]
         if at[1].size:

@@ -7,6 +7,7 @@ that depend on the state, L(x) w and M(x) v.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 from navfilters.estimators.continuous import ContinuousSystem, Reference, Signal
 from navfilters.estimators.discrete import DiscreteSystem
-from navfilters.numerics.small_matrices import matrix
+from navfilters.numerics.small_matrices import matrix, vector
 from navfilters.types import Array, Gaussian
 
 
@@ -74,6 +75,10 @@ class Setup:
     deviation: tuple[float, float] = (0.1, 0.1)
     duration: float = 20.0
 
+    def __post_init__(self) -> None:
+        for name in ("sensor", "shaking", "guess", "deviation"):  # lists too: a set-up is a key
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+
     @property
     def prior(self) -> Gaussian:
         """The filters' first estimate."""
@@ -96,8 +101,8 @@ class Setup:
         )
 
     def control(self, t: float) -> Array:
-        """The known angular acceleration of the motor at the pivot, (1,), rad/s^2."""
-        return np.array([self.drive * np.sin(self.drive_rate * t)])
+        """The known angular acceleration at the pivot at times (...), (..., 1), rad/s^2."""
+        return (self.drive * np.sin(self.drive_rate * t))[..., None]
 
     def f(self, x: Array, u: Array, w: Array, t: float) -> Array:
         """Rate of the state.
@@ -120,43 +125,43 @@ class Setup:
         array (..., 2)
         """
         xp = x.__array_namespace__()
-        angle, rate = x[..., 0], x[..., 1]
-        pull = (self.gravity + w[..., 1]) * xp.sin(angle) + w[..., 0] * xp.cos(angle)
-        return xp.stack([rate, u[..., 0] - self.damping * rate - pull / self.length], axis=-1)
+        angle, rate, aside, up = (component(a, i) for a in (x, w) for i in (0, 1))
+        pull = (self.gravity + up) * xp.sin(angle) + aside * xp.cos(angle)
+        return vector([rate, component(u, 0) - self.damping * rate - pull / self.length])
 
     def A(self, x: Array, u: Array, w: Array, t: float) -> Array:
         """df/dx, (..., 2, 2)."""
         xp = x.__array_namespace__()
-        angle = x[..., 0]
-        pull = (self.gravity + w[..., 1]) * xp.cos(angle) - w[..., 0] * xp.sin(angle)
+        angle = component(x, 0)
+        pull = (self.gravity + component(w, 1)) * xp.cos(angle) - component(w, 0) * xp.sin(angle)
         zero = 0 * pull
         return matrix([[zero, zero + 1], [-pull / self.length, zero - self.damping]])
 
     def L(self, x: Array, u: Array, w: Array, t: float) -> Array:
         """df/dw, (..., 2, 2): a gain that depends on the state."""
         xp = x.__array_namespace__()
-        angle = x[..., 0]
+        angle = component(x, 0)
         zero = 0 * angle
         return matrix([[zero, zero], [-xp.cos(angle) / self.length, -xp.sin(angle) / self.length]])
 
     def range(self, x: Array) -> Array:
         """Distance between bob and sensor, (...), m."""
         xp = x.__array_namespace__()
-        right = self.length * xp.sin(x[..., 0]) - self.sensor[0]
-        up = -self.length * xp.cos(x[..., 0]) - self.sensor[1]
+        angle = component(x, 0)
+        right = self.length * xp.sin(angle) - self.sensor[0]
+        up = -self.length * xp.cos(angle) - self.sensor[1]
         return xp.sqrt(right * right + up * up)
 
     def h(self, x: Array, v: Array, t: float) -> Array:
         """y = range (1 + v), (..., 1), m; v (..., 1) is the error as a fraction of the range."""
-        xp = x.__array_namespace__()
-        return xp.stack([self.range(x) * (1 + v[..., 0])], axis=-1)
+        return (self.range(x) * (1 + component(v, 0)))[..., None]
 
     def C(self, x: Array, v: Array, t: float) -> Array:
         """dh/dx, (..., 1, 2)."""
         xp = x.__array_namespace__()
-        angle = x[..., 0]
+        angle = component(x, 0)
         turn = -self.sensor[0] * xp.cos(angle) - self.sensor[1] * xp.sin(angle)
-        return matrix([[self.length * turn / self.range(x) * (1 + v[..., 0]), 0 * angle]])
+        return matrix([[self.length * turn / self.range(x) * (1 + component(v, 0)), 0 * angle]])
 
     def M(self, x: Array, v: Array, t: float) -> Array:
         """dh/dv, (..., 1, 1), m: the range itself."""
@@ -165,8 +170,7 @@ class Setup:
     def reference(self) -> Reference:
         """The planned motion: released at rest from ``planned``, driven by u(t), no noise."""
         still = np.zeros(2)
-        x = _motion(self, self.planned, lambda t: still)
-        return Reference(x, self.control)
+        return Reference(_motion(self, self.planned, lambda t: still), self.control)
 
     def experiment(self, seed: int) -> tuple[Signal, Signal]:
         """One shaken pendulum and what the range finder says of it.
@@ -179,25 +183,34 @@ class Setup:
         Returns
         -------
         tuple of callable
-            x(t) (2,) and y(t) (1,), smooth functions of t in [0, duration].
+            x(t) (..., 2) and y(t) (..., 1), smooth functions of t (...) in [0, duration].
         """
-        rng = np.random.default_rng(seed)
-        w = band_limited_noise(rng, np.array(self.shaking), self.bandwidth, self.duration)
-        v = band_limited_noise(rng, np.array([self.ranging]), self.bandwidth, self.duration)
-        x = _motion(self, self.released, w)
-        return x, lambda t: self.h(x(t), v(t), t)
+        return _experiment(self, seed)
+
+
+@lru_cache(maxsize=64)
+def _experiment(setup: Setup, seed: int) -> tuple[Signal, Signal]:
+    rng = np.random.default_rng(seed)
+    w = band_limited_noise(rng, np.array(setup.shaking), setup.bandwidth, setup.duration)
+    v = band_limited_noise(rng, np.array([setup.ranging]), setup.bandwidth, setup.duration)
+    x = _motion(setup, setup.released, w)
+    return x, lambda t: setup.h(x(t), v(t), t)
 
 
 def _motion(setup: Setup, angle: float, w: Signal) -> Signal:
-    """The pendulum released at rest, (2,) at any time of the experiment."""
+    """The pendulum released at rest, (..., 2) at any times (...) of the experiment."""
 
     def rate(t: float, x: Array) -> Array:
         return setup.f(x, setup.control(t), w(t), t)
 
-    span = 0.0, setup.duration
-    return solve_ivp(
-        rate, span, [angle, 0.0], method="DOP853", dense_output=True, rtol=1e-10, atol=1e-10
-    ).sol
+    fine = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-10, "dense_output": True}
+    x = solve_ivp(rate, (0.0, setup.duration), [angle, 0.0], **fine).sol
+    return lambda t: x(t).T
+
+
+def component(x: Array, i: int) -> Array:
+    """x_i over the batch axes; of a single vector a number, which NumPy works with faster."""
+    return x[i] if x.ndim == 1 else x[..., i]
 
 
 def band_limited_noise(
@@ -225,8 +238,12 @@ def band_limited_noise(
     waves = rng.standard_normal((2 * count, len(root))) * root * np.sqrt(2 / duration)
 
     def noise(t: Any) -> Array:
-        phase = rates * np.asarray(t)[..., None]
-        return np.concatenate([np.cos(phase), np.sin(phase)], axis=-1) @ waves
+        phase = np.multiply.outer(t, rates)
+        both = np.empty((*phase.shape[:-1], 2 * count))
+        np.cos(phase, out=both[..., :count])
+        np.sin(phase, out=both[..., count:])
+        # A product for each time: its digits do not depend on how many are asked for.
+        return both @ waves if both.ndim == 1 else (both[..., None, :] @ waves)[..., 0, :]
 
     return noise
 
@@ -267,17 +284,17 @@ def discretised(system: ContinuousSystem, dt: float) -> DiscreteSystem:
     )
 
 
-def sampled(signal: Signal, times: Array) -> Array:
+def sampled(signal: Callable[[Any], Array], times: Array) -> Array:
     """A signal at several times.
 
     Parameters
     ----------
     signal : callable
-        t -> (m,).
+        Times (k,) -> (k, m).
     times : array (K,)
 
     Returns
     -------
     array (K, m)
     """
-    return np.array([signal(t) for t in times])
+    return signal(times)

@@ -6,8 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from navfilters.papers.pogorelsky2020.experiment import NOMINAL, Setup
+from navfilters.space.navigation_state import NavigationState
+from navfilters.space.pose import retract
 from navfilters.space.quaternions import from_rotation_vector, normalized, product
-from navfilters.types import Array
+from navfilters.types import Array, Gaussian
 
 
 class Noise(NamedTuple):
@@ -91,3 +93,9 @@ def misalignment(setup: Setup, walk: Array) -> Array:
         turned = product(from_rotation_vector(step * walk[..., k, :]), q[-1])
         q.append(normalized(turned))
     return np.stack(q, axis=-2)
+
+
+def first_estimate(setup: Setup, true: NavigationState, drawn: Array) -> Gaussian:
+    """The truth without a drawn error, so that truth minus estimate is that error exactly."""
+    error = np.sqrt(np.diag(setup.P0)) * drawn
+    return Gaussian(retract(true.x, -error), np.broadcast_to(setup.P0, (len(drawn), 9, 9)))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from navfilters.estimators.state import FilterState
 from navfilters.numerics import validation
 from navfilters.papers.pogorelsky2020.experiment import PAPER, Setup, of_case
-from navfilters.papers.pogorelsky2020.noise_draws import Noise, misalignment, noise
+from navfilters.papers.pogorelsky2020.noise_draws import Noise, first_estimate, misalignment, noise
 from navfilters.papers.pogorelsky2020.true_flight import Truth, truth
 from navfilters.runs.consistency import SampleDeviation, mean_nees, sample_deviation
 from navfilters.runs.loop import run
@@ -17,8 +18,8 @@ from navfilters.space.frames import east_north_up, ellipsoid_intersection
 from navfilters.space.image_measurement import Measurement
 from navfilters.space.image_sensor import SarPass
 from navfilters.space.navigation_state import NavigationState
-from navfilters.space.pose import difference, retract
-from navfilters.types import Array, Gaussian
+from navfilters.space.pose import difference
+from navfilters.types import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +82,13 @@ class SimulatedImages:
         -------
         array (runs, 3)
         """
-        model = replace(self.setup.geometry, T_e_b=self.flight.T_e_b[k])
-        return ellipsoid_intersection(self.flight.x[k, :3], model.boresight(self.q_mu[:, k]))
+        beam = self._pass.at(k).boresight(self.q_mu[:, k])
+        return ellipsoid_intersection(self.flight.x[k, :3], beam)
+
+    @cached_property
+    def _pass(self) -> SarPass:
+        attitudes = self.flight.T_e_b
+        return SarPass(replace(self.setup.geometry, T_e_b=attitudes), attitudes)  # once checked
 
     def true_state(self, k: int) -> NavigationState:
         """The state at the start, or that the image after interval k is made at.
@@ -256,12 +262,6 @@ def monte_carlo(
         innovations[made],
         S[made],
     )
-
-
-def first_estimate(setup: Setup, true: NavigationState, drawn: Array) -> Gaussian:
-    """The truth without a drawn error, so that truth minus estimate is that error exactly."""
-    error = np.sqrt(np.diag(setup.P0)) * drawn
-    return Gaussian(retract(true.x, -error), np.broadcast_to(setup.P0, (len(drawn), 9, 9)))
 
 
 def open_table(

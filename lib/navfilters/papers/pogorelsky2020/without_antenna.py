@@ -7,12 +7,8 @@ from typing import Any, Literal
 import numpy as np
 
 from navfilters.papers.pogorelsky2020.experiment import Setup, of_case
-from navfilters.papers.pogorelsky2020.open_loop import (
-    MonteCarlo,
-    first_estimate,
-    monte_carlo,
-    simulate_images,
-)
+from navfilters.papers.pogorelsky2020.noise_draws import first_estimate
+from navfilters.papers.pogorelsky2020.open_loop import MonteCarlo, monte_carlo, simulate_images
 from navfilters.papers.pogorelsky2020.timed_images import (
     TimedImages,
     sweep_speed,
