@@ -65,9 +65,9 @@ def flight(burns=BURNS):
         for t, h in parts(k):
             x = advance(x, h, PUSH * fires(t, burns))
         states.append(x)
-    states = np.array(states)
-    states.setflags(write=False)
-    return states
+    path = np.array(states)
+    path.setflags(write=False)
+    return path
 
 
 def differences(function, x):
