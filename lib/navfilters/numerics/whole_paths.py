@@ -9,10 +9,10 @@ import numpy as np
 from navfilters.numerics.loops import is_jax
 from navfilters.types import Array
 
-AT_A_TIME = 1000
+AT_A_TIME = 4000
 """States worked on at a time: enough to amortise a call, few enough for the cache."""
 
-FEW = 20
+FEW = 60
 """Fewer steps at a time than these do not pay for the sweeps."""
 
 BRIEF = 1e-6

@@ -1,21 +1,31 @@
 """The flight of Xiong et al. by other means: Eq. (36) written out, differences, plain inverses."""
 
+from functools import lru_cache
+
 import numpy as np
 
 MU, RADIUS, J2 = 3.986004418e14, 6378137.0, 1.08262668e-3
 PUSH = 0.4527952178
 BURNS = ((7293, 8373), (11279, 12068))
+OF_J2 = np.array([1.0, 1.0, 3.0])
 STARS = np.array([[0.5**0.5, 0, 0.5**0.5], [0, 1, 0]])
 SIZES = np.array([10.0] * 3 + [1e-2] * 3 + [1e-4])  # of the differences
 
 
 def rate(x, push):
     """dx/dt of (..., 6) with an acceleration along the velocity."""
-    r2 = np.sum(x[..., :3] ** 2, axis=-1, keepdims=True)
-    bracket = 1 + 1.5 * J2 * RADIUS**2 / r2 * (np.array([1, 1, 3]) - 5 * x[..., 2:3] ** 2 / r2)
-    v = x[..., 3:6]
-    along = v / np.sqrt(np.sum(v**2, axis=-1, keepdims=True))
-    return np.concatenate([v, -MU * x[..., :3] / r2**1.5 * bracket + push * along], axis=-1)
+    r2 = squared(x[..., :3])
+    bracket = 1 + 1.5 * J2 * RADIUS**2 / r2 * (OF_J2 - 5 * x[..., 2:3] ** 2 / r2)
+    v, a = x[..., 3:6], -MU * x[..., :3] / r2**1.5 * bracket
+    if np.any(push):
+        a = a + push * (v / np.sqrt(squared(v)))
+    return np.concatenate([v, a], axis=-1)
+
+
+def squared(v):
+    """Lengths (..., 1) of vectors (..., 3), squared."""
+    v = v**2
+    return v[..., :1] + v[..., 1:2] + v[..., 2:]
 
 
 def advance(x, h, push):
@@ -45,8 +55,9 @@ def angles(x):
     return np.arccos(cosine)
 
 
+@lru_cache
 def flight(burns=BURNS):
-    """The true states at 0, 100, ..., 20 000 s, (201, 6)."""
+    """The true states at 0, 100, ..., 20 000 s, (201, 6), not to be written into."""
     speed, tilt = np.sqrt(MU / (RADIUS + 500e3)), np.deg2rad(27.0)
     x = np.array([RADIUS + 500e3, 0, 0, 0, speed * np.cos(tilt), speed * np.sin(tilt)])
     states = [x]
@@ -54,15 +65,18 @@ def flight(burns=BURNS):
         for t, h in parts(k):
             x = advance(x, h, PUSH * fires(t, burns))
         states.append(x)
-    return np.array(states)
+    path = np.array(states)
+    path.setflags(write=False)
+    return path
 
 
 def differences(function, x):
-    """Central differences of a function of states (..., n): (..., m, n)."""
+    """A function of states (..., n) and its central differences: (..., m) and (..., m, n)."""
     n = x.shape[-1]
     steps = np.diag(SIZES[:n])
-    up, down = function(x[..., None, :] + steps), function(x[..., None, :] - steps)
-    return np.swapaxes((up - down) / (2 * SIZES[:n, None]), -1, -2)
+    found = function(x[..., None, :] + np.concatenate([steps, -steps, np.zeros((1, n))]))
+    up, down, here = found[..., :n, :], found[..., n:-1, :], found[..., -1, :]
+    return here, np.swapaxes((up - down) / (2 * SIZES[:n, None]), -1, -2)
 
 
 def predicted(x, k, arcs, q_v, quiet):
@@ -80,10 +94,10 @@ def predicted(x, k, arcs, q_v, quiet):
         on = fires(t, arcs)
 
         def move(y, t=t, h=h, on=on):
-            push = y[..., 6:] * on if n == 7 else 0.0
+            push = y[..., 6:] if on and n == 7 else 0.0
             return np.concatenate([advance(y[..., :6], h, push), y[..., 6:]], axis=-1)
 
-        step, x = differences(move, x), move(x)
+        x, step = differences(move, x)
         half = E + h / 2 * np.eye(n, k=3) * (np.arange(n) < 6) * (np.arange(n) > 2)
         Q = 4e-10 * np.diag(np.arange(n) < 3)
         Q = Q + (quiet + on * q_v) * np.diag((np.arange(n) > 2) * (np.arange(n) < 6))
@@ -131,7 +145,7 @@ def expected(sigma, burns=BURNS, arcs=(), q_v=0.0, quiet=2e-4, strength=False):
             modelled, F, W = predicted(truth[k - 1], k - 1, arcs, q_v, quiet)
             P = F @ P @ F.T + W
             mean = F @ mean + (truth[k] - modelled)[:, None]
-            H = differences(angles, truth[k])
+            _, H = differences(angles, truth[k])
             K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
             left = np.eye(n) - K @ H
             turned = np.swapaxes(left, -1, -2)
@@ -157,7 +171,8 @@ def fly(z, sigma, rule=None, arcs=(), q_v=0.0, quiet=2e-4, strength=False):
     for k in range(200):
         x, F, W = predicted(x, k, arcs, q_v, quiet)
         P = F @ P @ np.swapaxes(F, -1, -2) + W
-        y, H = z[k] - angles(x), differences(angles, x)
+        expected_z, H = differences(angles, x)
+        y = z[k] - expected_z
         if rule is not None:
             P, memory = rule(memory, y, H, P, R, W)
         T = np.swapaxes(H, -1, -2)
@@ -258,7 +273,8 @@ def two_models(z, sigma, stay, back, q_v):
         fit = []
         for j, (y, F, W) in enumerate(moved):
             C = F @ starts[j][1] @ np.swapaxes(F, -1, -2) + W
-            H, e = differences(angles, y), z[k] - angles(y)
+            expected_z, H = differences(angles, y)
+            e = z[k] - expected_z
             S = H @ C @ np.swapaxes(H, -1, -2) + R
             K = C @ np.swapaxes(H, -1, -2) @ np.linalg.inv(S)
             x[j], P[j] = y + (K @ e[..., None])[..., 0], C - K @ H @ C

@@ -1,6 +1,6 @@
 """Motion in orbit in inertial axes."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
@@ -13,7 +13,7 @@ from navfilters.numerics.analytic import dot
 from navfilters.numerics.loops import is_jax, repeat
 from navfilters.numerics.runge_kutta import euler_increment, runge_kutta_increment
 from navfilters.numerics.whole_paths import whole_path
-from navfilters.space import variations
+from navfilters.space import sub_steps, variations
 from navfilters.space.gravity import EARTH, Gravity
 from navfilters.space.thrust import COASTING, Thrust, along_velocity
 from navfilters.types import Array
@@ -139,11 +139,10 @@ class Orbit:
             s^-2 by position and s^-1 by velocity in the last three rows.
         """
         xp = x.__array_namespace__()
-        E_r, E_v = xp.asarray(POSITION), xp.asarray(VELOCITY)
-        of_x = self.gravity.gradient(x[..., :3]) @ E_r
-        if thrust is not None:
-            of_x = of_x + along_velocity(x[..., 3:], thrust) @ E_v
-        return E_r.mT @ E_v + E_v.mT @ of_x
+        G = self.gravity.gradient(x[..., :3])
+        V = xp.zeros_like(G) if thrust is None else along_velocity(x[..., 3:], thrust)
+        same = xp.zeros_like(G) + xp.eye(3)
+        return xp.concat([xp.concat([xp.zeros_like(G), same], -1), xp.concat([G, V], -1)], -2)
 
     def f(self, x: Array) -> Array:
         """The state at the interval's end.
@@ -179,8 +178,7 @@ class Orbit:
         if is_jax(x.__array_namespace__()):
             return self._forwards(x)
         states = self._states(x, self.start)
-        *_, F = self._to_end(states, self.start)
-        return states[-1], F
+        return states[-1], np.ascontiguousarray(self._to_end(states)[0].mT)
 
     def propagate(self, x: Array, Q: Array) -> tuple[Array, Array, Array]:
         """The same, and the covariance at the end of a noise that enters after every sub-step.
@@ -206,8 +204,9 @@ class Orbit:
         if is_jax(x.__array_namespace__()):
             return self._forwards(x, Q)
         states = self._states(x, self.start)
-        *later, F = self._to_end(states, self.start)
-        return states[-1], F, sum(Phi @ Q @ Phi.mT for Phi in reversed(later))
+        turned = self._to_end(states)
+        W = variations.accumulated(turned, Q)
+        return states[-1], np.ascontiguousarray(turned[0].mT), W
 
     def path(self, x: Array, t: Array | None = None) -> Array:
         """The states after every sub-step.
@@ -242,17 +241,12 @@ class Orbit:
         """
         xp = path.__array_namespace__()
         thrust = self._pushes(t, path.shape[0] - 1, path[0])
-        h, x = self.step, path[:-1]
         if self.integrator == "euler":
-            return xp.eye(6) + h * self.jacobian(x, thrust)
-        at = variations.middle(x, path[1:], h)
+            return xp.eye(6) + self.step * self.jacobian(path[:-1], thrust)
         if is_jax(xp):
-            return variations.third_order(h * self.jacobian(at, thrust))
-        F = variations.coasting_transition(self.gravity.gradient(at[..., :3]), h)
-        if thrust is not None:
-            fires = thrust.reshape(len(thrust), -1).any(axis=1)
-            F[fires] = variations.third_order(h * self.jacobian(at[fires], thrust[fires]))
-        return F
+            at = variations.middle(path[:-1], path[1:], self.step)
+            return variations.third_order(self.step * self.jacobian(at, thrust))
+        return sub_steps.transitions(self.gravity, path, self.step, thrust)
 
     def _pushes(self, t: Array, count: int, x: Array) -> Array | None:
         """Strength in the middle of each sub-step from t, (count, ...), for such states as x."""
@@ -268,6 +262,8 @@ class Orbit:
         thrust = None if pushes is None else pushes[k]
         if isinstance(thrust, np.ndarray | np.generic) and not thrust.any():
             thrust = None  # saves its term
+        if self.integrator == "rk4" and isinstance(x, np.ndarray) and x.dtype.char in "dD":
+            return sub_steps.increment(self.gravity, x, h, thrust)
         return INTEGRATORS[self.integrator](partial(self.derivative, thrust=thrust), x, h)
 
     def _states(self, x: Array, t: Array) -> Array:
@@ -276,8 +272,15 @@ class Orbit:
         longest = int(0.13 / (self.gravity.fastest * self.step))
         return whole_path(increment, x, self.step, self.substeps, longest)
 
-    def _to_end(self, states: Array, t: float) -> Iterator[Array]:
-        return variations.to_end(lambda k, x: self.transitions(x, t + k * self.step), states, 6)
+    def _to_end(self, states: Array) -> np.ndarray:
+        def turned(k: int, part: Array) -> np.ndarray:
+            t = self.start + k * self.step
+            if self.integrator == "euler":
+                return self.transitions(part, t).mT
+            thrust = self._pushes(t, len(part) - 1, part[0])
+            return sub_steps.transitions(self.gravity, part, self.step, thrust, turned=True)
+
+        return variations.all_to_end(turned, states, 6)
 
     def _forwards(self, x: Array, Q: Array | None = None) -> tuple[Array, ...]:
         """f(x), F and, given Q, W, for JAX."""
@@ -292,9 +295,6 @@ class Orbit:
             return x_next, partial(variations.series, A, self.step, order)
 
         return variations.forwards(sub_step, x, self.substeps, 6, Q)
-
-
-POSITION, VELOCITY = np.eye(6)[:3], np.eye(6)[3:]  # r = POSITION @ x; constants, not concat: faster
 
 
 INTEGRATORS = {"rk4": runge_kutta_increment, "euler": euler_increment}  # Eq. (35)

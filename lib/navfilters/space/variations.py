@@ -1,6 +1,7 @@
 """How small differences of position and velocity grow in a step: A = [0, I; G, V], written out."""
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -8,7 +9,7 @@ from navfilters.numerics.loops import repeat
 from navfilters.numerics.small_matrices import written_out
 from navfilters.types import Array
 
-CACHED = 2000
+CACHED = 4000
 """Matrices worked on at a time: enough to amortise a call, few enough for the cache."""
 
 
@@ -61,34 +62,6 @@ def third_order(hA: Array) -> Array:
     """exp(h A) to third order, (..., 6, 6)."""
     eye = hA.__array_namespace__().eye(6)
     return eye + hA @ (eye + hA @ (eye / 2 + hA / 6))
-
-
-def coasting_transition(G: Array, h: float) -> Array:
-    """exp(h A) to third order in h where no force depends on the velocity, under NumPy.
-
-    [I + h^2/2 G, h I + h^3/6 G; h G + h^3/6 G^2, I + h^2/2 G]
-
-    Parameters
-    ----------
-    G : array (..., 3, 3)
-        Derivative of the acceleration with respect to position, s^-2, symmetric.
-    h : float
-        Length of the step, s.
-
-    Returns
-    -------
-    array (..., 6, 6)
-    """
-    F = np.empty((*G.shape[:-2], 6, 6), G.dtype)
-    for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)):
-        one, g = float(i == j), G[..., i, j]
-        squared = sum(G[..., i, k] * G[..., k, j] for k in range(3))
-        same = one + (h * h / 2) * g
-        of_r, of_v = h * g + (h**3 / 6) * squared, one * h + (h**3 / 6) * g
-        for a, b in {(i, j), (j, i)}:
-            F[..., a, b] = F[..., 3 + a, 3 + b] = same
-            F[..., 3 + a, b], F[..., a, 3 + b] = of_r, of_v
-    return F
 
 
 def forwards(
@@ -159,6 +132,60 @@ def to_end(transitions: Callable[[int, Array], Array], path: Array, n: int) -> I
         for F in transitions(first, path[first : first + size + 1])[::-1]:
             Phi = Phi @ F
             yield Phi
+
+
+def all_to_end(
+    transposed: Callable[[int, Array], np.ndarray], path: np.ndarray, n: int
+) -> np.ndarray:
+    """The derivatives of :func:`to_end`, transposed, for the host.
+
+    Parameters
+    ----------
+    transposed : callable
+        As of :func:`to_end`, but it gives the transposes.
+    path : array (k + 1, ..., m)
+    n : int
+
+    Returns
+    -------
+    array (k + 1, ..., n, n)
+        In the order of the path: the last is the identity.
+    """
+    count, batch = len(path) - 1, path.shape[1:-1]
+    turned = np.empty((count + 1, *batch, n, n), path.dtype)
+    turned[count] = np.eye(n)
+    size = max(1, CACHED // max(1, path[0, ..., 0].size))
+    for first in reversed(range(0, count, size)):
+        F = transposed(first, path[first : first + size + 1])
+        for k in reversed(range(len(F))):
+            np.matmul(F[k], turned[first + k + 1], out=turned[first + k])
+    return turned
+
+
+def accumulated(turned: np.ndarray, Q: Array) -> Array:
+    """sum_k Phi_k Q Phi_k^T, of a noise that enters after each step.
+
+    Parameters
+    ----------
+    turned : array (k + 1, ..., n, n)
+        Of :func:`all_to_end`.
+    Q : array (..., n, n)
+
+    Returns
+    -------
+    array (..., n, n)
+    """
+    # Transposed, BLAS takes half the time: each term is (Phi (Phi Q)^T)^T, to the last bit.
+    missing = max(0, Q.ndim - turned.ndim + 1)  # axes that only Q has, behind that of the steps
+    turned = turned.reshape(len(turned), *(1,) * missing, *turned.shape[1:])
+    Q_turned = np.ascontiguousarray(Q.mT)
+    size = max(1, CACHED // max(1, turned[0, ..., 0, 0].size))
+    W: Any = 0.0
+    for first in range(1, len(turned), size):
+        some = turned[first : first + size]
+        for term in some.mT @ (Q_turned @ some):
+            W = W + term
+    return W.mT
 
 
 def middle(x: Array, x_next: Array, h: float) -> Array:

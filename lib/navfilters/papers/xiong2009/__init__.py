@@ -56,6 +56,7 @@ from navfilters.papers.xiong2009.rivals import (
     fly_rival,
     imm,
 )
+from navfilters.papers.xiong2009.side_by_side import Flown, SideBySide
 from navfilters.papers.xiong2009.true_flight import Truth, truth
 
 __all__ = [
@@ -74,10 +75,12 @@ __all__ = [
     "CurrentNoise",
     "Estimator",
     "Flight",
+    "Flown",
     "Mismatched",
     "OtherUnits",
     "Rival",
     "Setup",
+    "SideBySide",
     "Simulation",
     "Truth",
     "assumptions",

@@ -13,6 +13,9 @@ from navfilters.space.inertial_orbit import Orbit
 from navfilters.space.thrust import COASTING
 from navfilters.types import Array
 
+AT_A_TIME = 1000
+"""Paths worked on at a time, which fit the cache."""
+
 
 def noise(seeds: Iterable[int], setup: Setup = VARIANTS["A"]) -> Array:
     """Standard normal noise of each update, seed and star, (updates, seeds, m).
@@ -122,14 +125,20 @@ def errors_each_second(
     first = max(0, -(-since // setup.interval) - 1)  # the interval that since ends or lies in
     starts, every = mean[first:-1], round(1 / setup.step)
     times = setup.interval * np.arange(first, len(mean) - 1.0)
+    orbit, batch = _orbit(setup, knows_thrust), mean.shape[1:-1]
+    estimate = np.empty((1 + len(starts) * setup.interval, *batch, 3))
+    estimate[:1] = starts[:1, ..., :3]
+    intervals = estimate[1:].reshape(len(starts), setup.interval, *batch, 3)
+    size = max(1, AT_A_TIME // max(1, mean[0, ..., 0].size))
     with np.errstate(all="ignore"):  # a member that fails is not finite in the result
-        path = _orbit(setup, knows_thrust).path(starts, times)[every - 1 :: every, ..., :3]
-    path[-1] = mean[first + 1 :, ..., :3]
-    seconds = np.swapaxes(path, 0, 1).reshape(-1, *path.shape[2:])
+        for first_of in range(0, len(starts), size):
+            some = slice(first_of, first_of + size)
+            path = orbit.path(starts[some], times[some])[every - 1 :: every, ..., :3]
+            intervals[some] = np.swapaxes(path, 0, 1)
+    intervals[:, -1] = mean[first + 1 :, ..., :3]
     kept = setup.duration + 1 - since
-    estimate = np.concatenate([starts[:1, ..., :3], seconds])[-kept:]
     true = truth(setup).states[-kept:, :3]
-    return true.reshape(kept, *(1,) * (estimate.ndim - 2), 3) - estimate
+    return true.reshape(kept, *(1,) * (estimate.ndim - 2), 3) - estimate[-kept:]
 
 
 def errors(

@@ -1,0 +1,58 @@
+"""The host's sub-steps are those of the formulas, to the last bit."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from navfilters.numerics.runge_kutta import runge_kutta_increment
+from navfilters.space import Orbit
+from navfilters.space.gravity import EARTH
+from navfilters.space.sub_steps import gradient, increment, transitions
+from navfilters.space.variations import accumulated, middle, third_order
+
+CIRCULAR = np.array([5e6, 4e6, 2e6, -5e3, 5.5e3, 1.5e3])
+
+
+def states(*batch):
+    return CIRCULAR * (1 + 1e-2 * np.random.default_rng(1).normal(size=(*batch, 6)))
+
+
+@pytest.mark.parametrize("batch", [(), (1,), (3, 7)])
+@pytest.mark.parametrize("thrust", [None, 0.45])
+@pytest.mark.parametrize("h", [1.0, 30.0])
+def test_a_step_is_runge_kutta_of_the_derivative(batch, thrust, h):
+    x = states(*batch)
+    push = None if thrust is None else np.full(batch, thrust)
+    wanted = runge_kutta_increment(partial(Orbit().derivative, thrust=push), x, h)
+    assert_array_equal(increment(EARTH, x, h, push), wanted)
+
+
+def test_the_gradient_by_elements():
+    x = states(4)
+    found = np.moveaxis(np.array(gradient(EARTH, x[:, :3].T)), -1, 0)
+    assert_array_equal(found, EARTH.gradient(x[:, :3]))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_transitions_are_the_series_of_the_jacobian(turned):
+    """Of steps that burn, to the last bit; of the others but for rounding."""
+    path, h = Orbit(substeps=6).path(states(5)), 1.0
+    thrust = np.array([0.0, 0.45, 0.0, 0.0, 0.45])[:, None]
+    F = transitions(EARTH, path, h, thrust, turned=turned)
+    F = F.mT if turned else F
+    at = middle(path[:-1], path[1:], h)
+    wanted = third_order(h * Orbit().jacobian(at, thrust))
+    assert_array_equal(F[[1, 4]], wanted[[1, 4]])
+    np.testing.assert_allclose(F, wanted, rtol=1e-13, atol=1e-16)
+
+
+@pytest.mark.parametrize("axes", [(), (2, 1)])
+def test_noise_is_accumulated_term_by_term(axes):
+    rng = np.random.default_rng(2)
+    Phi, Q = rng.normal(size=(7, 3, 6, 6)), rng.normal(size=(*axes, 6, 6))
+    W = 0.0
+    for one in Phi[1:]:
+        W = W + one @ Q @ one.mT
+    assert_array_equal(accumulated(np.ascontiguousarray(Phi.mT), Q), W)
