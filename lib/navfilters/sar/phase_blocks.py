@@ -1,4 +1,4 @@
-"""Phase factors of a spectrum by blocks of lines, which fit the cache and go to two threads."""
+"""Phase factors and transforms by blocks, which fit the cache and go to two threads."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -19,6 +19,7 @@ BLOCKS = 8  # at least, so that a phase that is quadratic in frequency is nearly
 CHANGE = 2.0  # of a phase across a block, rad, at most
 NODES = 6  # lines of a block at which a phase is exact; 4e-5 rad between them, for that change
 PIECE = 32  # columns in a matrix product: so small that BLAS starts no threads, which would wait
+COLUMNS = 32  # of a matrix that are transformed at once: a few MB
 
 
 def lines_at_once(f: Array, *phases: tuple[Phase, Array]) -> int:

@@ -10,6 +10,7 @@ from navfilters.numerics import validation
 from navfilters.sar.images.raw_data import RawData
 from navfilters.sar.images.slant_image import Image
 from navfilters.sar.phase_blocks import (
+    COLUMNS,
     PIECE,
     Phase,
     blocks,
@@ -107,8 +108,12 @@ class Focuser:
             np.multiply(pulse, matched, out=spectrum[rows])
 
         in_threads(compress, blocks(pulses, 64))
-        spectrum = fft.fft(spectrum, axis=0, workers=2, overwrite_x=True)
-        self._spectrum = spectrum[self._kept]
+        self._spectrum = np.empty((len(self._kept), m), np.complex64)
+
+        def transform(columns: slice) -> None:
+            self._spectrum[:, columns] = fft.fft(spectrum[:, columns], axis=0)[self._kept]
+
+        in_threads(transform, blocks(m, COLUMNS))
 
     @property
     def range_spacing(self) -> float:
@@ -170,9 +175,15 @@ class Focuser:
 
         most = lines_at_once(self._f, (migration, self._f_R), (change, distance))
         in_threads(fill, blocks(len(self._f), most))
-        focused = fft.ifft(padded, axis=0, workers=2, overwrite_x=True)
+        pixels = np.empty((self._lines, self._samples), np.complex64)
+
+        def focus(columns: slice) -> None:
+            focused = fft.ifft(padded[:, columns], axis=0)
+            pixels[:, columns] = focused[self._first : self._first + self._lines]
+
+        in_threads(focus, blocks(self._samples, COLUMNS))
         return Image(
-            focused[self._first : self._first + self._lines].copy(),  # without the other lines
+            pixels,
             self._first_time + self._first / self._prf,
             self._prf,
             self._near_range,
