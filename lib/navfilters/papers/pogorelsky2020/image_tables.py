@@ -101,14 +101,13 @@ def image_table(
     derivative = (acquired.effective(true + 1) - acquired.effective(true - 1)) / 2
     scene = acquired.scene
     place = (scene.map.latitude, scene.map.longitude, float(scene.height(0.0, 0.0)))
-    image = acquired.focuser.image(effective, acquired.slope)
     table = ImageTable(
         speed,
         sharp,
         np.zeros(0),
         np.zeros((0, 3)),
         np.zeros(0, int),
-        image.centre_range,
+        acquired.focuser.centre_range,
         acquired.r_f,
         true,
         np.array([effective, derivative, acquired.slope]),

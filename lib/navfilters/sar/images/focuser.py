@@ -125,6 +125,11 @@ class Focuser:
         """Of the carrier, m."""
         return self._wavelength
 
+    @property
+    def centre_range(self) -> float:
+        """Slant range of an image's centre pixel, where its velocity holds, m. Eq. (1)."""
+        return self._near_range + self._samples // 2 * self.range_spacing
+
     def image(self, velocity: float, slope: float = 0.0) -> Image:
         """Focus for an effective velocity.
 
@@ -152,7 +157,7 @@ class Focuser:
         ----------
         pogorelsky2020, section "SAR image formation".
         """
-        migration, R_mid = self._migrated(velocity), self._middle_range
+        migration, R_mid = self._migrated(velocity), self.centre_range
 
         def compression(f: Array, distance: Array) -> Array:
             squared = velocity**2 + slope * distance
@@ -240,11 +245,6 @@ class Focuser:
         in_threads(cut, blocks(len(self._f), most))
         return part
 
-    @property
-    def _middle_range(self) -> float:
-        """Where ``velocity`` holds and migration is removed exactly, m."""
-        return self._near_range + self._samples // 2 * self.range_spacing
-
     def _migrated(self, velocity: float) -> Phase:
         """A(f_t, f_R): removes the migration and secondary range compression that are left."""
         least = self._wavelength * np.abs(self._f).max() / 2
@@ -253,7 +253,7 @@ class Focuser:
                 f"velocity must be finite and above {2 * least:.0f} m/s; found {velocity}"
             )
         carrier = c / self._wavelength
-        scale = 4 * np.pi / c * self._middle_range if self._migration else 0.0
+        scale = 4 * np.pi / c * self.centre_range if self._migration else 0.0
 
         def removing(f: Array, f_R: Array, velocity: float) -> Array:
             D = np.sqrt(1 - (self._wavelength * f / (2 * velocity)) ** 2)
