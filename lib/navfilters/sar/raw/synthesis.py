@@ -23,6 +23,7 @@ from navfilters.types import Array
 
 
 ROWS = 64  # of a matrix that are transformed at once, 1 MB
+PRODUCT = 2**16  # multiplications in a matrix product: so few that BLAS starts no threads
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +237,13 @@ def _point_spectra(
     phase = np.outer(change.by_range, echoes.slant_range - R_b) - np.outer(f, time)
     phase += np.outer(change.by_height, echoes.height - mean_height)
     in_time = (np.exp(1j * phase) * carrier).astype(np.complex64)
-    np.matmul(in_time, np.exp(-1j * np.outer(delay, f_R)).astype(np.complex64), out=out)
+    in_range = np.exp(-1j * np.outer(delay, f_R)).astype(np.complex64)
+
+    def multiply(rows: slice) -> None:
+        for columns in parts(len(f_R), COLUMNS):
+            np.matmul(in_time[rows], in_range[:, columns], out=out[rows, columns])
+
+    in_threads(multiply, parts(len(f), PRODUCT // (COLUMNS * (len(delay) + 1)) + 1))
 
 
 def _add_transferred(
