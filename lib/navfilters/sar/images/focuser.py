@@ -111,7 +111,8 @@ class Focuser:
         self._spectrum = np.empty((len(self._kept), m), np.complex64)
 
         def transform(columns: slice) -> None:
-            self._spectrum[:, columns] = fft.fft(spectrum[:, columns], axis=0)[self._kept]
+            column = fft.fft(spectrum[:, columns].copy(), axis=0, overwrite_x=True)
+            self._spectrum[:, columns] = column[self._kept]
 
         in_threads(transform, blocks(m, COLUMNS))
 
@@ -183,7 +184,8 @@ class Focuser:
         pixels = np.empty((self._lines, self._samples), np.complex64)
 
         def focus(columns: slice) -> None:
-            focused = fft.ifft(padded[:, columns], axis=0)
+            column = padded[:, columns].copy()  # whose lines are neighbours
+            focused = fft.ifft(column, axis=0, overwrite_x=True)
             pixels[:, columns] = focused[self._first : self._first + self._lines]
 
         in_threads(focus, blocks(self._samples, COLUMNS))
@@ -260,7 +262,11 @@ class Focuser:
             whole = np.sqrt((carrier + f_R) ** 2 - (c * f / (2 * velocity)) ** 2)
             return scale * (whole - carrier * D - f_R)
 
+        whole_swath = removing(np.zeros((1, 1)), self._f_R, np.inf)  # at any frequency the same
+
         def phase(f: Array, f_R: Array) -> Array:
+            if np.isinf(self._removed) and f_R is self._f_R:
+                return removing(f, f_R, velocity) - whole_swath
             return removing(f, f_R, velocity) - removing(f, f_R, self._removed)
 
         return phase
