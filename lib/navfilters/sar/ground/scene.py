@@ -7,7 +7,7 @@ import numpy as np
 
 from navfilters.sar.ground.land_cover import LandCover, lambert
 from navfilters.sar.ground.terrain import LocalMap, Terrain
-from navfilters.sar.phase_blocks import blocks, in_threads
+from navfilters.sar.in_parts import blocks, in_threads
 from navfilters.types import Array
 
 ROWS = 16

@@ -9,13 +9,11 @@ from scipy.constants import c
 from navfilters.numerics import validation
 from navfilters.sar.images.raw_data import RawData
 from navfilters.sar.images.slant_image import Image
+from navfilters.sar.in_parts import COLUMNS, blocks, in_threads
 from navfilters.sar.phase_blocks import (
-    COLUMNS,
     PIECE,
     Phase,
-    blocks,
     fast_length,
-    in_threads,
     lines_at_once,
     phasor,
     unit,
