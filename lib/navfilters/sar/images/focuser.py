@@ -169,20 +169,22 @@ class Focuser:
         in_the_middle = unit(compression(self._f[:, None], np.zeros(1)))
         size = -(-self._samples // PIECE) * PIECE
         distance = self.range_spacing * (np.arange(size) - self._samples // 2)
-        padded = np.zeros((self._n, self._samples), np.complex64)
+        filtered = np.empty((len(self._f), self._samples), np.complex64)
 
         def fill(lines: slice) -> None:
             data = phasor(change, self._f[lines], distance)[:, : self._samples]
             data *= in_the_middle[lines]
-            data *= self._straightened(migration, lines)[:, : self._samples]
-            padded[self._kept[lines]] = data
+            np.multiply(
+                data, self._straightened(migration, lines)[:, : self._samples], out=filtered[lines]
+            )
 
         most = lines_at_once(self._f, (migration, self._f_R), (change, distance))
         in_threads(fill, blocks(len(self._f), most))
         pixels = np.empty((self._lines, self._samples), np.complex64)
 
         def focus(columns: slice) -> None:
-            column = padded[:, columns].copy()  # whose lines are neighbours
+            column = np.zeros((self._n, columns.stop - columns.start), np.complex64)
+            column[self._kept] = filtered[:, columns]
             focused = fft.ifft(column, axis=0, overwrite_x=True)
             pixels[:, columns] = focused[self._first : self._first + self._lines]
 
