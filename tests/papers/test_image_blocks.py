@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal, assert_equal
+from scipy.interpolate import CubicSpline
 
 from navfilters.papers.pogorelsky2020 import (
     CASES,
@@ -29,7 +30,7 @@ from navfilters.papers.pogorelsky2020 import (
     truth,
     write_own,
 )
-from navfilters.sar.images.autofocusing import sharpness
+from navfilters.sar.images.autofocusing import hill_climb, sharpness
 from navfilters.sar.images.slant_image import Image
 from navfilters.sar.raw.radar import Radar
 from navfilters.space import ellipsoid_intersection
@@ -107,6 +108,19 @@ def table(k, peak):
         np.array([7181.9, 1.054, 0.0]),
         np.zeros(3),
     )
+
+
+@pytest.mark.parametrize("steps", [(4.0, 1.0), (4.0, 0.3), (0.25,)])
+def test_many_climbs_are_those_that_ask_point_by_point(steps):
+    bumpy = table(1, 0.5)
+    bumpy = bumpy._replace(sharpness=np.cos(bumpy.speed / 3) - np.abs(bumpy.speed - 7510) / 9)
+    rng, curve = np.random.default_rng(0), CubicSpline(bumpy.speed, bumpy.sharpness)
+    starts = bumpy.true_speed + rng.uniform(-90, 90, 40)
+    offsets = rng.normal(0, 0.3, 40)
+    for climb, start, o in zip(bumpy.climbs(starts, steps, offsets), starts, offsets, strict=True):
+        limits = (bumpy.speed[0] - o, bumpy.speed[-1] - o)
+        alone = hill_climb(lambda speed, o=o: float(curve(speed + o)), start, steps, limits)
+        assert_equal(climb, alone)  # NaN is NaN
 
 
 def test_runs_that_share_a_table_are_the_loop_of_before():

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters.sar.phase_blocks import PIECE, blocks, in_threads, lines_at_once, phasor, unit
+from navfilters.sar.in_parts import blocks, in_threads
+from navfilters.sar.phase_blocks import PIECE, lines_at_once, phasor, unit
 
 
 def quadratic(rate):

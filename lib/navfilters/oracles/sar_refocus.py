@@ -7,7 +7,8 @@ parabola.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -15,7 +16,8 @@ FINE = (1.0, 0.25, 0.1)
 """Steps of the search, m/s."""
 
 
-class Pixels(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Pixels:
     """A focused image and what it was focused with.
 
     Parameters
@@ -41,27 +43,48 @@ class Pixels(NamedTuple):
         """The same, fading over so many lines at both ends as (1 - cos) / 2."""
         rise = (1 - np.cos(np.pi * (np.arange(lines) + 0.5) / lines)) / 2
         weight = np.concatenate([rise, np.ones(len(self.values) - 2 * lines), rise[::-1]])
-        return self._replace(values=(self.values * weight[:, None]).astype(np.complex64))
+        return replace(self, values=(self.values * weight[:, None]).astype(np.complex64))
+
+    @cached_property
+    def azimuth(self) -> np.ndarray:
+        """The azimuth spectrum (lines, samples) at the velocity it was focused with."""
+        return np.fft.fft(self.values, axis=0)
 
     def spectrum(self, faster: float) -> tuple[np.ndarray, np.ndarray]:
         """Doppler frequencies (lines, 1), Hz, and the azimuth spectrum for another velocity."""
-        f = np.fft.fftfreq(len(self.values), 1 / self.prf)[:, None]
-        s = (self.wavelength * f / 2) ** 2
+        lines = len(self.values)
+        f = np.fft.fftfreq(lines, 1 / self.prf)[:, None]
+        s = (self.wavelength * f[: lines // 2 + 1] / 2) ** 2  # the same for negative frequencies
         D, other = (np.sqrt(1 - s / v**2) for v in (self.velocity, self.velocity + faster))
         less = (4 * np.pi / self.wavelength * (other - D)).astype(np.float32)  # some rad in all
-        turn = less * self.slant_range.astype(np.float32)
-        return f, np.fft.fft(self.values, axis=0) * np.exp(np.complex64(1j) * turn)
+        turn = np.exp(np.complex64(1j) * (less * self.slant_range.astype(np.float32)))
+        turn = np.concatenate([turn, turn[1 : (lines + 1) // 2][::-1]])
+        return f, self.azimuth * turn
+
+
+ASKED = 64
+"""Velocities at which what the criteria share is kept: all of one block's."""
+
+
+@lru_cache(ASKED)
+def _spectrum(p: Pixels, faster: float) -> tuple[np.ndarray, np.ndarray]:
+    return p.spectrum(faster)
+
+
+@lru_cache(ASKED)
+def _intensity(p: Pixels, faster: float) -> np.ndarray:
+    return np.abs(np.fft.ifft(_spectrum(p, faster)[1], axis=0)) ** 2
 
 
 def contrast(p: Pixels, faster: float) -> float:
     """Variance over squared mean of the intensity."""
-    g = np.abs(np.fft.ifft(p.spectrum(faster)[1], axis=0)) ** 2
+    g = _intensity(p, faster)
     return float(np.var(g) / np.mean(g) ** 2)
 
 
 def order(p: Pixels, faster: float) -> float:
     """Minus the entropy of the intensity, in natural units."""
-    g = np.abs(np.fft.ifft(p.spectrum(faster)[1], axis=0)) ** 2
+    g = _intensity(p, faster)
     share = g[g > 0] / g.sum()
     return float(share @ np.log(share))
 
@@ -71,7 +94,7 @@ def agreement(p: Pixels, faster: float) -> float:
 
     Its maximum over the velocity is where the looks' pictures fall on each other.
     """
-    f, spectrum = p.spectrum(faster)
+    f, spectrum = _spectrum(p, faster)
     looks = [np.abs(np.fft.ifft(spectrum * side, axis=0)) ** 2 for side in (f < 0, f > 0)]
     a, b = (g - g.mean(axis=0) for g in looks)
     return float(np.sum(a * b))

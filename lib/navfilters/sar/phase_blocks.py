@@ -1,7 +1,6 @@
-"""Phase factors of a spectrum by blocks of lines, which fit the cache and go to two threads."""
+"""Phase factors of a spectrum by blocks of lines, which fit the cache."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 
 import numpy as np
@@ -112,30 +111,3 @@ def fast_length(least: int) -> int:
     int
     """
     return PIECE * fft.next_fast_len(-(-least // PIECE))
-
-
-def blocks(n: int, most: int) -> list[slice]:
-    """Slices of n lines, so many in each at most.
-
-    Parameters
-    ----------
-    n, most : int
-
-    Returns
-    -------
-    list of slice
-    """
-    return [slice(i, min(i + most, n)) for i in range(0, n, most)]
-
-
-def in_threads(work: Callable[[slice], None], parts: list[slice]) -> None:
-    """Do all parts of some work, of which none writes what another does.
-
-    Parameters
-    ----------
-    work : callable
-    parts : list of slice
-    """
-    with ThreadPoolExecutor(2) as pool:
-        for _ in pool.map(work, parts):
-            pass  # here an error in a thread is raised

@@ -82,10 +82,7 @@ class Images:
         table = self.tables(self.setup, k, self.imaging)
         start = np.linalg.norm(state.v, axis=-1)
         offset = self._offset(k, table, state)
-        climbs = [
-            table.climb(float(s), self.imaging.steps, float(o))
-            for s, o in zip(start, offset, strict=True)
-        ]
+        climbs = table.climbs(start, self.imaging.steps, offset)
         speed = np.array([climb.speed for climb in climbs])
         r_f = np.full((len(speed), 3), np.nan)
         focused = np.isfinite(speed)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from navfilters.papers.pogorelsky2020.image_tables import ImageTable
 from navfilters.papers.pogorelsky2020.imaging import Acquisition, Imaging
 from navfilters.sar.images.autofocusing import sharpness
 from navfilters.sar.images.focus_criteria import image_entropy
-from navfilters.sar.images.ground_image import to_ground
+from navfilters.sar.images.ground_image import GroundImage, to_ground
 from navfilters.sar.images.map_drift import drift_to_velocity, look_drift
 from navfilters.sar.images.slant_image import Image, effective_velocity
 from navfilters.sar.matching.geolocation import geolocate
@@ -149,11 +150,7 @@ class BlockPlace:
         -------
         BlockPlace
         """
-
-        def derivative(x: Array) -> Array:
-            return np.concatenate([x[..., 3:], acquired.acceleration(x)], axis=-1)
-
-        flight = Flight.through(derivative, np.concatenate([acquired.r, acquired.v]), 2.0)
+        flight = _flight(acquired)
         lines = block.pixels.shape[0] // 2 - whole.pixels.shape[0] // 2
         t = block.first_time - whole.first_time + lines / block.prf
         height = float(acquired.scene.height(0.0, 0.0))
@@ -165,6 +162,16 @@ class BlockPlace:
         a = acquired.acceleration(np.concatenate([r, v]))
         speed = float(effective_velocity(r, v, r_f, a) ** 2 / np.linalg.norm(v))
         return cls(r_f, view_of(flight, r_f).incidence, speed)
+
+
+@lru_cache(maxsize=3)
+def _flight(acquired: Acquisition) -> Flight:
+    """Through where the centre pixel was closest."""
+
+    def derivative(x: Array) -> Array:
+        return np.concatenate([x[..., 3:], acquired.acceleration(x)], axis=-1)
+
+    return Flight.through(derivative, np.concatenate([acquired.r, acquired.v]), 2.0)
 
 
 class BlockMatches(NamedTuple):
@@ -207,9 +214,22 @@ def match_blocks(
     -------
     BlockMatches
     """
-    image = acquired.focuser.image(acquired.effective(acquired.speed + offset), acquired.slope)
     known = acquired.reference if reference is None else reference
     errors, inliers = list[Array](), list[int]()
+    for place, ground in _grounds(acquired, imaging, lines, samples, offset):
+        match = geolocate(ground, known, relief=imaging.relief)
+        errors.append(match.r_f - place.r_f)
+        inliers.append(match.inliers)
+    return BlockMatches(np.array(errors), np.array(inliers))
+
+
+@lru_cache(maxsize=3)
+def _grounds(
+    acquired: Acquisition, imaging: Imaging, lines: int, samples: int, offset: float
+) -> list[tuple[BlockPlace, GroundImage]]:
+    """Blocks on the ground, once for all references that they are matched with."""
+    image = acquired.focuser.image(acquired.effective(acquired.speed + offset), acquired.slope)
+    found = list[tuple[BlockPlace, GroundImage]]()
     for block in cut_blocks(image, lines, samples):
         place = BlockPlace.of(acquired, image, block)
         ground = to_ground(
@@ -219,10 +239,8 @@ def match_blocks(
             looks=imaging.looks,
             pixel=imaging.pixel,
         )
-        match = geolocate(ground, known, relief=imaging.relief)
-        errors.append(match.r_f - place.r_f)
-        inliers.append(match.inliers)
-    return BlockMatches(np.array(errors), np.array(inliers))
+        found.append((place, ground))
+    return found
 
 
 def block_tables(

@@ -67,9 +67,42 @@ class ImageTable(NamedTuple):
         -------
         Climb
         """
+        return self.climbs(np.array([start]), steps, np.array([offset]))[0]
+
+    def climbs(self, starts: Array, steps: Sequence[float], offsets: Array) -> list[Climb]:
+        """Many of them.
+
+        Parameters
+        ----------
+        starts : array (n,)
+            m/s.
+        steps : sequence of float
+            m/s.
+        offsets : array (n,)
+            m/s.
+
+        Returns
+        -------
+        list of Climb
+        """
         curve = CubicSpline(self.speed, self.sharpness)
-        limits = (float(self.speed[0]) - offset, float(self.speed[-1]) - offset)
-        return hill_climb(lambda speed: float(curve(speed + offset)), start, steps, limits)
+        low, high = float(self.speed[0]), float(self.speed[-1])
+        # all that climbs can ask if longer steps are multiples of the shortest, in one call
+        shortest = min((step for step in steps if step > 0), default=1.0)
+        most = np.ceil((high - low) / shortest)
+        asked = starts[:, None] + shortest * np.arange(-most, most + 1)
+        heights = curve(asked + offsets[:, None])
+
+        def climb(start: float, offset: float, known: dict[float, float]) -> Climb:
+            def height(speed: float) -> float:
+                return known[speed] if speed in known else float(curve(speed + offset))
+
+            return hill_climb(height, start, steps, (low - offset, high - offset))
+
+        return [
+            climb(float(start), float(offset), dict(zip(x.tolist(), y.tolist(), strict=True)))
+            for start, offset, x, y in zip(starts, offsets, asked, heights, strict=True)
+        ]
 
 
 def image_table(
@@ -101,21 +134,21 @@ def image_table(
     derivative = (acquired.effective(true + 1) - acquired.effective(true - 1)) / 2
     scene = acquired.scene
     place = (scene.map.latitude, scene.map.longitude, float(scene.height(0.0, 0.0)))
-    image = acquired.focuser.image(effective, acquired.slope)
     table = ImageTable(
         speed,
         sharp,
         np.zeros(0),
         np.zeros((0, 3)),
         np.zeros(0, int),
-        image.centre_range,
+        acquired.focuser.centre_range,
         acquired.r_f,
         true,
         np.array([effective, derivative, acquired.slope]),
         np.array(place),
     )
     starts = np.arange(speed[0], speed[-1], 0.25)
-    ends = np.array([table.climb(float(s), imaging.steps).speed for s in starts])
+    climbs = table.climbs(starts, imaging.steps, np.zeros(len(starts)))
+    ends = np.array([climb.speed for climb in climbs])
     matched = np.unique(np.round(4 * (ends[np.isfinite(ends)] - true))) / 4 + true
     found = [_locate(acquired, float(s), imaging) for s in matched]
     return table._replace(

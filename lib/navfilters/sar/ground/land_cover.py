@@ -1,6 +1,7 @@
 """Land cover, and how bright it is."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,11 +27,19 @@ def smooth_field(shape: tuple[int, int], correlation: float, rng: np.random.Gene
         Mean 0 and variance 1 over the ensemble.
     """
     white = rng.standard_normal(shape, dtype=np.float32)
+    spectrum = fft.rfft2(white, workers=2)
+    spectrum *= _smoothing(tuple(shape), correlation)
+    return fft.irfft2(spectrum, s=shape, workers=2, overwrite_x=True)
+
+
+@lru_cache(maxsize=8)
+def _smoothing(shape: tuple[int, int], correlation: float) -> Array:
+    """Gaussian in frequency, scaled so that the variance stays 1."""
     f = [fft.fftfreq(shape[0])[:, None], fft.rfftfreq(shape[1])[None, :]]
     kernel = np.exp(-2 * (np.pi * correlation) ** 2 * (f[0] ** 2 + f[1] ** 2)).astype(np.float32)
     both = np.concatenate([kernel, kernel[:, 1 : shape[1] - kernel.shape[1] + 1]], axis=1)
     power = np.sqrt(np.mean(both**2))
-    return fft.irfft2(fft.rfft2(white, workers=2) * (kernel / power), s=shape, workers=2)
+    return kernel / power
 
 
 class CoverClass(NamedTuple):

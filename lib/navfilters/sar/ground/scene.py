@@ -7,7 +7,11 @@ import numpy as np
 
 from navfilters.sar.ground.land_cover import LandCover, lambert
 from navfilters.sar.ground.terrain import LocalMap, Terrain
+from navfilters.sar.in_parts import blocks, in_threads
 from navfilters.types import Array
+
+ROWS = 16
+"""Of a grid that are looked up at once: they fit the cache."""
 
 
 class Points(NamedTuple):
@@ -108,9 +112,16 @@ class Scene:
             A grid that leaves the terrain.
         """
         flight, away = view.axes
-        east = along[:, None] * flight[0] + across * away[0]
-        north = along[:, None] * flight[1] + across * away[1]
-        height = self.height(east, north).astype(np.float32)
+        height = np.empty((len(along), len(across)), np.float32)
+        cover = np.empty_like(height)
+
+        def look_up(rows: slice) -> None:
+            east = along[rows, None] * flight[0] + across * away[0]
+            north = along[rows, None] * flight[1] + across * away[1]
+            height[rows] = self.height(east, north)
+            cover[rows] = self.cover.at(east, north)
+
+        in_threads(look_up, blocks(len(along), ROWS))
         if np.isnan(height).any():
             raise ValueError(
                 "along and across must stay on the terrain; found a grid from "
@@ -122,7 +133,7 @@ class Scene:
         # n = (-rise, -slope, 1): its length is also the area on the slope of one on the level
         stretch = np.sqrt(1 + rise * rise + slope * slope)
         cosine = (slope * np.sin(ray) + np.cos(ray)) / stretch
-        power = self.cover.at(east, north) * lambert(cosine) * stretch * (steps[0] * steps[1])
+        power = cover * lambert(cosine) * stretch * (steps[0] * steps[1])
         hidden = self._hidden(view, across, height)
         return np.where(hidden, 0, power).astype(np.float32), height
 

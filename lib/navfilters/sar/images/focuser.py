@@ -9,12 +9,11 @@ from scipy.constants import c
 from navfilters.numerics import validation
 from navfilters.sar.images.raw_data import RawData
 from navfilters.sar.images.slant_image import Image
+from navfilters.sar.in_parts import COLUMNS, blocks, in_threads
 from navfilters.sar.phase_blocks import (
     PIECE,
     Phase,
-    blocks,
     fast_length,
-    in_threads,
     lines_at_once,
     phasor,
     unit,
@@ -107,8 +106,13 @@ class Focuser:
             np.multiply(pulse, matched, out=spectrum[rows])
 
         in_threads(compress, blocks(pulses, 64))
-        spectrum = fft.fft(spectrum, axis=0, workers=2, overwrite_x=True)
-        self._spectrum = spectrum[self._kept]
+        self._spectrum = np.empty((len(self._kept), m), np.complex64)
+
+        def transform(columns: slice) -> None:
+            column = fft.fft(spectrum[:, columns].copy(), axis=0, overwrite_x=True)
+            self._spectrum[:, columns] = column[self._kept]
+
+        in_threads(transform, blocks(m, COLUMNS))
 
     @property
     def range_spacing(self) -> float:
@@ -119,6 +123,11 @@ class Focuser:
     def wavelength(self) -> float:
         """Of the carrier, m."""
         return self._wavelength
+
+    @property
+    def centre_range(self) -> float:
+        """Slant range of an image's centre pixel, where its velocity holds, m. Eq. (1)."""
+        return self._near_range + self._samples // 2 * self.range_spacing
 
     def image(self, velocity: float, slope: float = 0.0) -> Image:
         """Focus for an effective velocity.
@@ -147,7 +156,7 @@ class Focuser:
         ----------
         pogorelsky2020, section "SAR image formation".
         """
-        migration, R_mid = self._migrated(velocity), self._middle_range
+        migration, R_mid = self._migrated(velocity), self.centre_range
 
         def compression(f: Array, distance: Array) -> Array:
             squared = velocity**2 + slope * distance
@@ -160,19 +169,28 @@ class Focuser:
         in_the_middle = unit(compression(self._f[:, None], np.zeros(1)))
         size = -(-self._samples // PIECE) * PIECE
         distance = self.range_spacing * (np.arange(size) - self._samples // 2)
-        padded = np.zeros((self._n, self._samples), np.complex64)
+        filtered = np.empty((len(self._f), self._samples), np.complex64)
 
         def fill(lines: slice) -> None:
             data = phasor(change, self._f[lines], distance)[:, : self._samples]
             data *= in_the_middle[lines]
-            data *= self._straightened(migration, lines)[:, : self._samples]
-            padded[self._kept[lines]] = data
+            np.multiply(
+                data, self._straightened(migration, lines)[:, : self._samples], out=filtered[lines]
+            )
 
         most = lines_at_once(self._f, (migration, self._f_R), (change, distance))
         in_threads(fill, blocks(len(self._f), most))
-        focused = fft.ifft(padded, axis=0, workers=2, overwrite_x=True)
+        pixels = np.empty((self._lines, self._samples), np.complex64)
+
+        def focus(columns: slice) -> None:
+            column = np.zeros((self._n, columns.stop - columns.start), np.complex64)
+            column[self._kept] = filtered[:, columns]
+            focused = fft.ifft(column, axis=0, overwrite_x=True)
+            pixels[:, columns] = focused[self._first : self._first + self._lines]
+
+        in_threads(focus, blocks(self._samples, COLUMNS))
         return Image(
-            focused[self._first : self._first + self._lines].copy(),  # without the other lines
+            pixels,
             self._first_time + self._first / self._prf,
             self._prf,
             self._near_range,
@@ -229,11 +247,6 @@ class Focuser:
         in_threads(cut, blocks(len(self._f), most))
         return part
 
-    @property
-    def _middle_range(self) -> float:
-        """Where ``velocity`` holds and migration is removed exactly, m."""
-        return self._near_range + self._samples // 2 * self.range_spacing
-
     def _migrated(self, velocity: float) -> Phase:
         """A(f_t, f_R): removes the migration and secondary range compression that are left."""
         least = self._wavelength * np.abs(self._f).max() / 2
@@ -242,14 +255,18 @@ class Focuser:
                 f"velocity must be finite and above {2 * least:.0f} m/s; found {velocity}"
             )
         carrier = c / self._wavelength
-        scale = 4 * np.pi / c * self._middle_range if self._migration else 0.0
+        scale = 4 * np.pi / c * self.centre_range if self._migration else 0.0
 
         def removing(f: Array, f_R: Array, velocity: float) -> Array:
             D = np.sqrt(1 - (self._wavelength * f / (2 * velocity)) ** 2)
             whole = np.sqrt((carrier + f_R) ** 2 - (c * f / (2 * velocity)) ** 2)
             return scale * (whole - carrier * D - f_R)
 
+        whole_swath = removing(np.zeros((1, 1)), self._f_R, np.inf)  # at any frequency the same
+
         def phase(f: Array, f_R: Array) -> Array:
+            if np.isinf(self._removed) and f_R is self._f_R:
+                return removing(f, f_R, velocity) - whole_swath
             return removing(f, f_R, velocity) - removing(f, f_R, self._removed)
 
         return phase

@@ -42,8 +42,10 @@ class Reference:
     matcher: Matcher = MATCHER
     features: Features = field(init=False, repr=False)
     on_terrain: Array = field(init=False, repr=False)
+    _level: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "_level", self.scene.height(0.0, 0.0))
         features = self.matcher.features(self.values)
         x, y, height = self._terrain(*features.places.T)
         object.__setattr__(self, "features", features)
@@ -69,7 +71,7 @@ class Reference:
         where no slope is steep enough to be laid over.
         """
         x, y, height = self._terrain(column, row)
-        return *self.scene.map.geodetic(x, y), height + self.scene.height(0.0, 0.0)
+        return *self.scene.map.geodetic(x, y), height + self._level
 
     def height(self, column: Any, row: Any) -> Array:
         """Of the terrain at a place of a map with the image's pixels, above the middle.
@@ -84,7 +86,7 @@ class Reference:
         ndarray (...)
             m.
         """
-        return self.scene.height(*self._position(column, row)) - self.scene.height(0.0, 0.0)
+        return self.scene.height(*self._position(column, row)) - self._level
 
     def geodetic(self, column: Any, row: Any) -> tuple[Array, Array]:
         """Latitude and longitude of a place of that map, deg.
@@ -102,13 +104,12 @@ class Reference:
     def _terrain(self, column: Any, row: Any) -> tuple[Array, Array, Array]:
         """East, north and height above the middle of what pixels show, m."""
         east, north = self._position(column, row)
-        level = self.scene.height(0.0, 0.0)
         if self.view is None:
-            return east, north, self.scene.height(east, north) - level
+            return east, north, self.scene.height(east, north) - self._level
         away = self.view.axes[1]
         x, y, height = east, north, np.zeros_like(east)
         for _ in range(20):
-            height = self.scene.height(x, y) - level
+            height = self.scene.height(x, y) - self._level
             shift = height / np.tan(self.view.incidence)
             x, y = east + shift * away[0], north + shift * away[1]
         return x, y, height

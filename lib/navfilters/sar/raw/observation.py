@@ -88,8 +88,9 @@ def observe(
     echoes = _bright(radar, flight, scene, window, lines, samples, seeds[1])
     received = synthesize(radar, flight, window, echoes, raster, mean_height=float(h))
     rng = np.random.default_rng(seeds[2])
-    noise = rng.standard_normal((*received.shape, 2), dtype=np.float32).view(np.complex64)[..., 0]
-    received += np.float32(_noise_deviation(radar, flight, scene) / np.sqrt(2)) * noise
+    deviation = np.float32(_noise_deviation(radar, flight, scene) / np.sqrt(2))
+    for line in received:  # so small an array stays in the cache
+        line += deviation * rng.standard_normal(2 * len(line), np.float32).view(np.complex64)
     return receive(radar, window, received)
 
 

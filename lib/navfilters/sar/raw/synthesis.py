@@ -8,6 +8,8 @@ import numpy as np
 from scipy import fft
 from scipy.interpolate import CubicSpline
 
+from navfilters.sar.in_parts import COLUMNS, in_threads
+from navfilters.sar.in_parts import blocks as parts
 from navfilters.sar.raw.echoes_of_points import (
     Echoes,
     _half_aperture,
@@ -18,6 +20,9 @@ from navfilters.sar.raw.echoes_of_points import (
 from navfilters.sar.raw.flight import Flight
 from navfilters.sar.raw.radar import LIGHT, Radar, Window
 from navfilters.types import Array
+
+ROWS = 64  # of a matrix that are transformed at once, 1 MB
+PRODUCT = 2**16  # multiplications in a matrix product: so few that BLAS starts no threads
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,23 +144,20 @@ def synthesize(
     R_mid = window.near_range + sum(cells) / 2 * dR
     change = _Dispersion.of(radar, flight, t_mid, R_mid, mean_height, f)
     layers = None if raster is None else _layers(raster, change, mean_height, layer, n)
-    total = np.zeros((n, m), np.complex64)
+    total, part, points = (np.zeros((n, m), np.complex64) for _ in range(3))
     edges = np.linspace(*cells, blocks + 1).round().astype(int)
     for low, high in pairwise(edges):
         R_b = window.near_range + (low + high) / 2 * dR
-        part = np.zeros((n, m), np.complex64)
         if raster is not None and layers is not None:
             inside = np.arange(max(low, raster.cell), min(high, raster.cell + layers.shape[1]))
             offset = window.near_range + inside * dR - R_b
-            phase = np.outer(change.by_range, offset).astype(np.float32)
-            part[:, inside % m] = layers[:, inside - raster.cell] * _unit(phase)
-            part = fft.fft(part, axis=1, workers=2, overwrite_x=True)
+            _raster_spectra(layers[:, inside - raster.cell], change, offset, inside % m, part)
         if echoes is not None:
             cell = (echoes.slant_range - window.near_range) / dR
             mine = Echoes(*(a[(cell >= low) & (cell < high)] for a in echoes))
-            part += _point_spectra(radar, change, window, mine, f, f_R, R_b, mean_height)
-        part *= _transfer(radar, flight, t_mid, R_b, mean_height, half, n, f_R)
-        total += part
+            _point_spectra(radar, change, window, mine, f, f_R, R_b, mean_height, points)
+            part = np.add(part, points, out=part) if raster is not None else points
+        _add_transferred(total, part, radar, flight, t_mid, R_b, mean_height, half, f_R)
     total *= _pulse_spectrum(radar, m)
     return fft.ifft2(total, workers=2, overwrite_x=True)[: window.pulses, : window.ranges]
 
@@ -185,15 +187,35 @@ def _layers(raster: Raster, change: _Dispersion, mean_height: float, layer: floa
     level = (raster.height - mean_height) / layer
     total = np.zeros((n, cells), np.complex64)
     rows = (raster.line + np.arange(lines)) % n
-    for k in range(int(np.floor(level.min())), int(np.ceil(level.max())) + 1):
-        share = np.maximum(1 - np.abs(level - k), 0).astype(np.float32)
-        if not share.any():
-            continue
-        padded = np.zeros((n, cells), np.complex64)
-        padded[rows] = raster.amplitude * share
-        turned = np.exp(1j * (k * layer) * change.by_height).astype(np.complex64)
-        total += fft.fft(padded, axis=0, workers=2, overwrite_x=True) * turned[:, None]
+
+    def add(columns: slice) -> None:
+        here, amplitude = level[:, columns], raster.amplitude[:, columns]
+        for k in range(int(np.floor(here.min())), int(np.ceil(here.max())) + 1):
+            share = np.maximum(1 - np.abs(here - k), 0).astype(np.float32)
+            if not share.any():
+                continue
+            padded = np.zeros((n, share.shape[1]), np.complex64)
+            padded[rows] = amplitude * share
+            turned = np.exp(1j * (k * layer) * change.by_height).astype(np.complex64)
+            total[:, columns] += fft.fft(padded, axis=0, overwrite_x=True) * turned[:, None]
+
+    in_threads(add, parts(cells, COLUMNS))
     return total
+
+
+def _raster_spectra(
+    layers: Array, change: _Dispersion, offset: Array, place: Array, out: Array
+) -> None:
+    """Spectra (n, m) of a raster's layers at these offsets in range, in these columns."""
+
+    def transform(rows: slice) -> None:
+        turned = _unit(np.outer(change.by_range[rows], offset).astype(np.float32))
+        turned *= layers[rows]
+        padded = np.zeros((len(turned), out.shape[1]), np.complex64)
+        padded[:, place] = turned
+        out[rows] = fft.fft(padded, axis=1, overwrite_x=True)
+
+    in_threads(transform, parts(len(out), ROWS))
 
 
 def _point_spectra(
@@ -205,7 +227,8 @@ def _point_spectra(
     f_R: Array,
     R_b: float,
     mean_height: float,
-) -> Array:
+    out: Array,
+) -> None:
     """Spectra (n, m) of points, each an outer product."""
     time = 2 * np.pi * (echoes.time - window.first_time)
     delay = 4 * np.pi / LIGHT * (echoes.slant_range - window.near_range)
@@ -213,26 +236,47 @@ def _point_spectra(
     phase = np.outer(change.by_range, echoes.slant_range - R_b) - np.outer(f, time)
     phase += np.outer(change.by_height, echoes.height - mean_height)
     in_time = (np.exp(1j * phase) * carrier).astype(np.complex64)
-    return in_time @ np.exp(-1j * np.outer(delay, f_R)).astype(np.complex64)
+    in_range = np.exp(-1j * np.outer(delay, f_R)).astype(np.complex64)
+
+    def multiply(rows: slice) -> None:
+        for columns in parts(len(f_R), COLUMNS):
+            np.matmul(in_time[rows], in_range[:, columns], out=out[rows, columns])
+
+    in_threads(multiply, parts(len(f), PRODUCT // (COLUMNS * (len(delay) + 1)) + 1))
 
 
-def _transfer(
+def _add_transferred(
+    total: Array,
+    part: Array,
     radar: Radar,
     flight: Flight,
     t: float,
     slant_range: float,
     height: float,
     half: int,
-    n: int,
     f_R: Array,
-) -> Array:
-    """H(f_t, f_R): the azimuth spectrum of the exact echo, without that of the pulse."""
+) -> None:
+    """Add spectra times H(f_t, f_R): the exact echo's in azimuth, without that of the pulse."""
     k = np.arange(-half, half + 1)
     p = flight.ground_point(t, slant_range, height)
     distance, pattern = _history(radar, flight, p, t + k / radar.prf)
     migration = distance - slant_range
     carrier = pattern * np.exp(-4j * np.pi / radar.wavelength * migration)
-    delay = np.outer(migration * (4 * np.pi / LIGHT), f_R).astype(np.float32)
-    history = np.zeros((n, len(f_R)), np.complex64)
-    history[k % n] = _unit(-delay) * carrier[:, None].astype(np.complex64)
-    return fft.fft(history, axis=0, workers=2, overwrite_x=True)
+    carrier, metres = carrier[:, None].astype(np.complex64), migration * (4 * np.pi / LIGHT)
+    n, m = total.shape
+
+    def add(history: Array, columns: slice) -> None:
+        padded = np.zeros((n, history.shape[1]), np.complex64)
+        padded[k % n] = history * carrier
+        total[:, columns] += part[:, columns] * fft.fft(padded, axis=0, overwrite_x=True)
+
+    def both(columns: slice) -> None:
+        """The negative frequencies as well, whose phases are the positive ones' negatives."""
+        history = _unit(-np.outer(metres, f_R[columns]).astype(np.float32))
+        add(history, columns)
+        first, last = max(columns.start, 1), min(columns.stop, (m + 1) // 2)
+        if first < last:
+            history = history[:, first - columns.start : last - columns.start]
+            add(np.conj(history[:, ::-1]), slice(m - last + 1, m - first + 1))
+
+    in_threads(both, parts(m // 2 + 1, COLUMNS))
