@@ -14,7 +14,8 @@ SHOWN = """pairs => {
     return pairs.map(([row, patient, value]) => {
         figure.set({ row, patient, value });
         figure.draw();
-        return [dataset.ratio, dataset.honesty, dataset.honest, dataset.error, dataset.claim];
+        return [dataset.ratio, dataset.honesty, dataset.honest, dataset.settled, dataset.error,
+            dataset.claim];
     });
 }"""
 ROW = "document.querySelector('[data-figure=cures] .stage').figure.state.row"
@@ -38,10 +39,11 @@ def same(text, number):
 def test_every_pair_of_every_row_is_the_tables(page):
     pairs = [(row.label, cell) for row in rows(STORED) for cell in row.cells]
     shown = page.evaluate(SHOWN, [[label, cell.problem, ""] for label, cell in pairs])
-    for (_, cell), (ratio, honesty, honest, *_) in zip(pairs, shown, strict=True):
+    for (_, cell), (ratio, honesty, honest, settled_, *_) in zip(pairs, shown, strict=True):
         if cell.reason:
-            assert (ratio, honest) == ("NaN", "")
+            assert (ratio, honest, settled_) == ("NaN", "", "")
         else:
+            assert settled_ == str(cell.settled).lower()
             assert same(ratio, cell.ratio)
             assert same(honesty, cell.honesty)
             assert int(honest) == cell.honest
@@ -77,6 +79,19 @@ def test_a_dash_says_why(page):
     why = next(iter(reasons(STORED)["AEKF"]))
     page.evaluate(SHOWN, [["AEKF", "pendulum", ""]])
     assert why in page.locator("[data-figure=cures] .says").inner_text()
+
+
+def test_what_rounding_decides_is_lost_without_numbers(page):
+    for row in rows(STORED):
+        for cell in row.cells:
+            if not cell.settled:
+                page.evaluate(SHOWN, [[row.label, cell.problem, ""]])
+                says = page.locator("[data-figure=cures] .says").inner_text()
+                assert "decided by rounding" in says
+                shown = page.locator("[data-figure=cures] td[aria-selected]")
+                assert shown.inner_text() == "lost"
+                return
+    pytest.fail("no pair of the table is decided by rounding")
 
 
 def test_a_pointer_looks_and_a_click_chooses(page):

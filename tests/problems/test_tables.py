@@ -1,15 +1,22 @@
 """The table: complete, stored as it is computed, and read as it is written."""
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from navfilters import Gaussian
+from navfilters.models import Linear
 from navfilters.problems import (
     CURES,
     Cell,
+    Draw,
+    Problem,
     best,
     cells,
     elsewhere,
+    listing,
     own,
     problems,
     read,
@@ -18,6 +25,7 @@ from navfilters.problems import (
     stored,
     table,
 )
+from navfilters.problems.table import settled
 
 FULL = problems(full=True)
 BY_NAME = {cure.name: cure for cure in CURES}
@@ -48,7 +56,7 @@ def test_the_stored_table_is_what_the_library_computes(patient, cure):
     fresh = cells(FULL[patient], BY_NAME[cure], stored.RUNS, scan=False)[0]
     kept = own(STORED)[patient, cure]
     for name in ("ratio", "median", "lost", "honesty", "nis", "covered"):
-        assert getattr(fresh, name) == pytest.approx(getattr(kept, name), rel=1e-3)
+        assert getattr(fresh, name) == pytest.approx(getattr(kept, name), rel=6e-3)
     assert (fresh.honest, fresh.evaluations) == (kept.honest, kept.evaluations)
 
 
@@ -58,8 +66,44 @@ def test_a_table_is_read_as_it_was_written(tmp_path):
     stored.write(tmp_path / "table.csv", found)
     again = read(tmp_path / "table.csv")
     assert [c.cure for c in again] == [c.cure for c in found]
-    assert again[0].ratio == pytest.approx(found[0].ratio, rel=1e-3)
+    assert again[0].ratio == pytest.approx(found[0].ratio, rel=6e-3)
     assert again[-1].reason.startswith("needs a square H")
+
+
+def test_only_what_is_mostly_lost_is_decided_by_rounding():
+    """Where a filter works, the last bits of its first estimate do not matter."""
+    unsettled = [cell for cell in STORED if not cell.settled]
+    assert unsettled
+    assert min(cell.lost for cell in unsettled) > 0.5
+    first = own(STORED)
+    assert all(first[patient, "EKF"].settled for patient in FULL)
+
+
+class Chaotic:
+    """A logistic map for dynamics: a last bit is everything after some fifty steps."""
+
+    Q = np.array([[1e-30]])
+
+    def f(self, x):
+        return 4 * x * (1 - x)
+
+    def transition(self, x):
+        return self.f(x), (4 - 8 * x)[..., None] * 0.0
+
+
+def test_a_last_bit_that_decides_is_found():
+    def draw(runs, seed):
+        start = np.full((runs, 1), 0.3)
+        z = np.full((120, runs, 1), np.nan)
+        truth = np.full((121, 1, 1), 0.5)
+        return Draw(Gaussian(start, np.eye(1)), truth, z)
+
+    model = Linear(np.eye(1), np.eye(1))
+    still = Problem("still", draw, model, 120, (0,), "m", 120, dynamics=None)
+    moving = replace(still, name="chaos", dynamics=Chaotic())
+    for problem, wanted in ((still, True), (moving, False)):
+        (cell,) = settled(problem, BY_NAME["EKF"], 2)
+        assert cell.settled == wanted
 
 
 def test_another_file_is_refused(tmp_path):
@@ -70,6 +114,13 @@ def test_another_file_is_refused(tmp_path):
 
 def made(problem, cure, value, ratio, reason=""):
     return Cell(problem, cure, value, ratio=ratio, reason=reason)
+
+
+def test_a_value_that_rounding_decides_is_not_the_best():
+    few = replace(made("p", "AREKF", 0.1, 2.0), settled=False)
+    assert best([few, made("p", "AREKF", 0.2, 3.0)])["p", "AREKF"].value == 0.2
+    shown = listing(rows([few]))
+    assert "<td>lost</td>" in shown
 
 
 def test_rows_have_the_texts_value_and_the_best_in_hindsight():

@@ -19,7 +19,8 @@
     const chosen = ({ row, patient, value }) => {
       const all = values(row, patient);
       if (value !== "") return all.find((pair) => String(pair.value) === value) ?? all[0];
-      return row.endsWith("*") ? all.reduce((a, b) => ((b.ratio ?? Infinity) < (a.ratio ?? Infinity) ? b : a), all[0]) : all[0];
+      const order = (pair) => (pair.settled ? pair.ratio ?? Infinity : Infinity);
+      return row.endsWith("*") ? all.reduce((a, b) => (order(b) < order(a) ? b : a), all[0]) : all[0];
     };
     return stage.figure(host, "cures", first, (self) => {
       const { state } = self;
@@ -35,9 +36,9 @@
       cells.forEach((line, i) => line.forEach((cell, j) => {
         const pair = chosen({ row: rows[i], patient: patients[j], value: "" });
         cell.setAttribute("role", "gridcell");
-        cell.setAttribute("aria-label", `${rows[i]} on ${patients[j]}: ${pair ? `${digits(pair.ratio ?? NaN)} times the reference, ${WORDS[pair.honest]}` : "cannot act"}`);
-        if (pair) cell.dataset.shade = shade(pair.ratio);
-        if (pair && pair.honest === 0) cell.classList.add("honest");
+        cell.setAttribute("aria-label", `${rows[i]} on ${patients[j]}: ${!pair ? "cannot act" : pair.settled ? `${digits(pair.ratio ?? NaN)} times the reference, ${WORDS[pair.honest]}` : "lost"}`);
+        if (pair) cell.dataset.shade = shade(pair.settled ? pair.ratio : null);
+        if (pair?.settled && pair.honest === 0) cell.classList.add("honest");
         cell.addEventListener("click", () => { under = null; choose(i, j); });
         cell.addEventListener("focus", () => { if (rows[i] !== state.row || patients[j] !== state.patient) choose(i, j); });
         cell.addEventListener("pointerenter", (event) => { if (event.pointerType === "mouse") { under = { row: rows[i], patient: patients[j], value: "" }; self.set({}); } });
@@ -90,13 +91,16 @@
         now.setAttribute("aria-selected", "true");
         const [error, claim] = drawn(shown, pair), of = element("b", {}, `${shown.row.replace(" *", "")} on ${shown.patient}`);
         if (!pair) says.replaceChildren(of, `: cannot act. The cure ${reasons[cure(shown.row)]?.[shown.patient] ?? "was not tried"}.`);
-        else {
+        else if (!pair.settled) {
+          says.replaceChildren(of, pair.value === null ? "" : `, ${parameters[cure(shown.row)]} ${digits(pair.value)}`, ": ", element("b", {}, "lost"),
+            `, ${Math.round(100 * pair.lost)} % of the runs; how far and how sure is decided by rounding.`, pair.error.length ? "" : " Its course is not stored.");
+        } else {
           const with_ = pair.value === null ? "" : `, ${parameters[cure(shown.row)]} ${digits(pair.value)}`;
           says.replaceChildren(of, `${with_}: `, element("b", {}, pair.ratio === null ? "no number" : `${digits(pair.ratio)} times`), ` the reference of ${digits(reference)} ${unit}, `,
-            element("b", {}, WORDS[pair.honest]), ` (NEES ${pair.honesty === null ? "no number" : `${digits(pair.honesty)} of its expectation`}); ${Math.round(100 * pair.lost)} % of the runs are lost.`,
+            element("b", {}, WORDS[pair.honest]), ` (NEES ${pair.honesty === null ? "no number" : `${pair.honesty > 1000 ? "more than 1000" : digits(pair.honesty)} of its expectation`}); ${Math.round(100 * pair.lost)} % of the runs are lost.`,
             pair.error.length ? "" : " Its course is not stored.");
         }
-        Object.assign(host.dataset, { ratio: pair?.ratio ?? NaN, honesty: pair?.honesty ?? NaN, honest: pair?.honest ?? "", value: pair?.value ?? "", error, claim });
+        Object.assign(host.dataset, { ratio: pair?.ratio ?? NaN, honesty: pair?.honesty ?? NaN, honest: pair?.honest ?? "", settled: pair?.settled ?? "", value: pair?.value ?? "", error, claim });
       }
       if (named) requestAnimationFrame(() => named.scrollIntoView({ block: "center" }));
       return { controls, draw, nodes: [element("div", { class: "cures-and-course" }, element("div", { class: "course" }, picture, says), scroll)] };

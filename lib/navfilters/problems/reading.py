@@ -48,6 +48,8 @@ def own(found: Iterable[Cell]) -> dict[tuple[str, str], Cell]:
 def best(found: Iterable[Cell]) -> dict[tuple[str, str], Cell]:
     """The cell of each pair with the smallest error among the values that were tried.
 
+    One that rounding decides is no better than any other.
+
     Parameters
     ----------
     found : iterable of Cell
@@ -59,9 +61,13 @@ def best(found: Iterable[Cell]) -> dict[tuple[str, str], Cell]:
     chosen: dict[tuple[str, str], Cell] = {}
     for cell in found:
         key = cell.problem, cell.cure
-        if key not in chosen or cell.ratio < chosen[key].ratio:
+        if key not in chosen or _order(cell) < _order(chosen[key]):
             chosen[key] = cell
     return chosen
+
+
+def _order(cell: Cell) -> tuple[bool, float]:
+    return not cell.settled, cell.ratio
 
 
 def elsewhere(found: Sequence[Cell], cell: Cell, problem: str) -> Cell:
@@ -147,7 +153,7 @@ def listing(found: Sequence[Row]) -> str:
     -------
     str
         The row of "B-EKF 1", say, has the id "cure-b-ekf-1"; in its cells stand error over the
-        reference and the mark of honesty.
+        reference and the mark of honesty, or "lost" where rounding decides both.
     """
     heads = "".join(f'<th scope="col">{escape(cell.problem)}</th>' for cell in found[0].cells)
     lines = [
@@ -180,4 +186,6 @@ def anchor(label: str) -> str:
 def _pair(cell: Cell) -> str:
     if cell.reason:
         return "–"
+    if not cell.settled:
+        return "lost"
     return f"<span>{escape(compact(cell.ratio))}</span> {MARKS[cell.honest]}"

@@ -15,7 +15,7 @@ RUNS = 200
 
 
 def write(path: Any, found: Iterable[Cell]) -> None:
-    """Store a table, four digits of each number.
+    """Store a table, three digits of each number.
 
     Parameters
     ----------
@@ -26,10 +26,15 @@ def write(path: Any, found: Iterable[Cell]) -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(f.name for f in fields(Cell))
         for cell in found:
-            writer.writerow(
-                f"{v:.4g}" if isinstance(v, float) else "" if v is None else v
-                for v in asdict(cell).values()
-            )
+            writer.writerow(_text(v) for v in asdict(cell).values())
+
+
+def _text(value: Any) -> Any:
+    if isinstance(value, bool):
+        return int(value)
+    if isinstance(value, float):
+        return f"{value:.3g}"
+    return "" if value is None else value
 
 
 def read(path: Any = None) -> list[Cell]:
@@ -62,4 +67,6 @@ def _value(name: str, text: str) -> Any:
         return text
     if name in ("honest", "evaluations"):
         return int(text)
+    if name == "settled":
+        return text == "1"
     return float(text) if text else None

@@ -1,7 +1,8 @@
 """Every cure on every problem."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,17 @@ from navfilters.problems.cures import Cure, UnfitError
 from navfilters.problems.evaluations import evaluations
 from navfilters.problems.later_cures import CURES
 from navfilters.problems.outcome import Outcome, treat
-from navfilters.problems.problem import Problem
+from navfilters.problems.problem import Draw, Problem
 
 FEW = 3
 """Runs of a problem whose runs share their measurements."""
 
 TOGETHER = 4
 """Cures of one problem that a process tries in one go."""
+
+
+SETTLED = 0.2
+"""How far an error may move with the last bits of the first estimates and still be one."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,9 @@ class Cell:
         Over its expectation.
     evaluations : int
         States at which models are evaluated in one step.
+    settled : bool
+        Whether error and ``honest`` come again if the first estimates move by one unit in the last
+        place. Where not, rounding decides them, and they tell only that the filter is lost.
     reason : str
         Why the cure cannot act here; then all else is empty.
     """
@@ -57,6 +65,7 @@ class Cell:
     honest: int = 0
     nis: float = np.nan
     evaluations: int = 0
+    settled: bool = True
     reason: str = ""
 
 
@@ -149,4 +158,49 @@ def table(
 
 
 def _part(problem: Problem, cures: list[Cure], runs: int) -> list[Cell]:
-    return [cell for cure in cures for cell in cells(problem, cure, runs)]
+    return [cell for cure in cures for cell in settled(problem, cure, runs)]
+
+
+def settled(problem: Problem, cure: Cure, runs: int) -> list[Cell]:
+    """A cure on a problem as of ``cells``, and whether the last bits decide what becomes of it.
+
+    Parameters
+    ----------
+    problem : Problem
+    cure : Cure
+    runs : int
+
+    Returns
+    -------
+    list of Cell
+    """
+    both = (cells(p, cure, runs) for p in (problem, nudged(problem)))
+    return [
+        replace(cell, settled=_close(cell.ratio, other.ratio) and cell.honest == other.honest)
+        for cell, other in zip(*both, strict=True)
+    ]
+
+
+def _close(a: float, b: float) -> bool:
+    return bool(np.array_equal(a, b, equal_nan=True) or abs(a - b) <= SETTLED * min(a, b))
+
+
+def nudged(problem: Problem) -> Problem:
+    """The same problem, each number of its first estimates one unit in the last place larger.
+
+    Parameters
+    ----------
+    problem : Problem
+
+    Returns
+    -------
+    Problem
+    """
+    return replace(problem, draw=partial(_nudged, problem))
+
+
+def _nudged(problem: Problem, runs: int, seed: int) -> Draw:
+    draw = problem.drawn(runs, seed)
+    mean = draw.prior.mean
+    moved = np.where(mean == 0, mean, np.nextafter(mean, np.inf))
+    return draw._replace(prior=draw.prior._replace(mean=moved))

@@ -23,6 +23,7 @@ def honesty_matrix(
     honesty: Any,
     honest: Any,
     *,
+    lost: Any = False,
     lines: Sequence[int] = (),
     worst: float = 1e3,
 ) -> tuple[Any, Axes]:
@@ -32,9 +33,12 @@ def honesty_matrix(
     ----------
     rows, columns : sequence of str
     ratio, honesty : array-like (rows, columns)
-        Error over a reference, NEES over its expectation; NaN where there is no pair.
+        Error over a reference, NEES over its expectation, above 1000 without its number; NaN where
+        there is no pair.
     honest : int array-like (rows, columns)
         -1, 0 or 1: see ``MARKS``.
+    lost : bool array-like (rows, columns)
+        Pairs of which only that is known.
     lines : sequence of int
         Rows above which a line is drawn.
     worst : float
@@ -45,10 +49,11 @@ def honesty_matrix(
     tuple of Figure, Axes
     """
     ratio, honesty = np.asarray(ratio, float), np.asarray(honesty, float)
+    lost = np.broadcast_to(np.asarray(lost, bool), ratio.shape)
     figure, ax = plt.subplots(figsize=(4.3, 0.9 + 0.275 * len(rows)))
     shades = plt.get_cmap("YlOrBr")
     with np.errstate(all="ignore"):
-        level = np.clip(np.log10(ratio) / np.log10(worst), 0, 1)
+        level = np.where(lost, 1.0, np.clip(np.log10(ratio) / np.log10(worst), 0, 1))
     for i, j in np.ndindex(ratio.shape):
         if np.isnan(ratio[i, j]):
             ax.text(j, i, "–", ha="center", va="center", fontsize=7, color="0.5")
@@ -57,9 +62,13 @@ def honesty_matrix(
         ax.add_patch(Rectangle((j - 0.5, i - 0.5), 1, 1, facecolor=shade, edgecolor="0.8", lw=0.4))
         ink = "white" if np.dot(shade[:3], (0.3, 0.6, 0.1)) < 0.5 else "black"
         text: dict[str, Any] = {"ha": "center", "va": "center", "color": ink}
+        if lost[i, j]:
+            ax.text(j, i, "lost", fontsize=6.5, **text)
+            continue
         ax.text(j, i - 0.23, compact(ratio[i, j]), fontsize=7, fontweight="bold", **text)
         mark = MARKS[int(honest[i][j])]
-        ax.text(j, i + 0.24, f"{mark}{compact(honesty[i, j])}", fontsize=5.8, **text)
+        below = ">1000" if honesty[i, j] > 1000 else compact(honesty[i, j])
+        ax.text(j, i + 0.24, f"{mark}{below}", fontsize=5.8, **text)
         if honest[i][j] == 0:
             inner = Rectangle((j - 0.45, i - 0.45), 0.9, 0.9, fill=False, edgecolor=ink, lw=1.1)
             ax.add_patch(inner)
