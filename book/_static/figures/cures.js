@@ -92,8 +92,8 @@
         const [error, claim] = drawn(shown, pair), of = element("b", {}, `${shown.row.replace(" *", "")} on ${shown.patient}`);
         if (!pair) says.replaceChildren(of, `: cannot act. The cure ${reasons[cure(shown.row)]?.[shown.patient] ?? "was not tried"}.`);
         else if (!pair.settled) {
-          says.replaceChildren(of, pair.value === null ? "" : `, ${parameters[cure(shown.row)]} ${digits(pair.value)}`, ": ", element("b", {}, "lost"),
-            `, ${Math.round(100 * pair.lost)} % of the runs; how far and how sure is decided by rounding.`, pair.error.length ? "" : " Its course is not stored.");
+          says.replaceChildren(of, pair.value === null ? "" : `, ${parameters[cure(shown.row)]} ${digits(pair.value)}`, ": ", element("b", {}, `${Math.round(100 * pair.lost)} % of the runs are lost`),
+            ". How far, and how sure the filter is, is decided by rounding.", pair.error.length ? "" : " Its course is not stored.");
         } else {
           const with_ = pair.value === null ? "" : `, ${parameters[cure(shown.row)]} ${digits(pair.value)}`;
           says.replaceChildren(of, `${with_}: `, element("b", {}, pair.ratio === null ? "no number" : `${digits(pair.ratio)} times`), ` the reference of ${digits(reference)} ${unit}, `,
