@@ -1,5 +1,7 @@
 """The second autofocus, on a point that was focused with a known error."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -27,6 +29,6 @@ def test_a_point_is_mended(criterion, faster):
 def test_no_change_is_no_change_and_ends_fade():
     p = a_point(0.0)
     assert_allclose(np.fft.ifft(p.spectrum(0.0)[1], axis=0), p.values, atol=1e-6)
-    ends = np.abs(p._replace(values=np.ones((64, 2))).faded(16).values[:, 0])
+    ends = np.abs(replace(p, values=np.ones((64, 2))).faded(16).values[:, 0])
     assert_allclose(ends[[0, 31, 63]], [0.0024, 1.0, 0.0024], atol=2e-4)
     assert_allclose(ends, ends[::-1])

@@ -56,7 +56,7 @@ def test_the_stored_table_is_what_the_library_computes(patient, cure):
     fresh = cells(FULL[patient], BY_NAME[cure], stored.RUNS, scan=False)[0]
     kept = own(STORED)[patient, cure]
     for name in ("ratio", "median", "lost", "honesty", "nis", "covered"):
-        assert getattr(fresh, name) == pytest.approx(getattr(kept, name), rel=6e-3)
+        assert getattr(fresh, name) == pytest.approx(getattr(kept, name), rel=1e-3)
     assert (fresh.honest, fresh.evaluations) == (kept.honest, kept.evaluations)
 
 
@@ -66,7 +66,7 @@ def test_a_table_is_read_as_it_was_written(tmp_path):
     stored.write(tmp_path / "table.csv", found)
     again = read(tmp_path / "table.csv")
     assert [c.cure for c in again] == [c.cure for c in found]
-    assert again[0].ratio == pytest.approx(found[0].ratio, rel=6e-3)
+    assert again[0].ratio == pytest.approx(found[0].ratio, rel=1e-3)
     assert again[-1].reason.startswith("needs a square H")
 
 
@@ -94,11 +94,11 @@ class Chaotic:
 def test_a_last_bit_that_decides_is_found():
     def draw(runs, seed):
         start = np.full((runs, 1), 0.3)
-        z = np.full((120, runs, 1), np.nan)
+        z = np.zeros((120, runs, 1))
         truth = np.full((121, 1, 1), 0.5)
         return Draw(Gaussian(start, np.eye(1)), truth, z)
 
-    model = Linear(np.eye(1), np.eye(1))
+    model = Linear(np.eye(1), 1e30 * np.eye(1))  # sees nothing
     still = Problem("still", draw, model, 120, (0,), "m", 120, dynamics=None)
     moving = replace(still, name="chaos", dynamics=Chaotic())
     for problem, wanted in ((still, True), (moving, False)):

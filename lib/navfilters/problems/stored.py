@@ -15,7 +15,7 @@ RUNS = 200
 
 
 def write(path: Any, found: Iterable[Cell]) -> None:
-    """Store a table, three digits of each number.
+    """Store a table, four digits of each number; see ``settled`` for what they are worth.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def _text(value: Any) -> Any:
     if isinstance(value, bool):
         return int(value)
     if isinstance(value, float):
-        return f"{value:.3g}"
+        return f"{value:.4g}"
     return "" if value is None else value
 
 
