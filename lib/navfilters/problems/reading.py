@@ -1,5 +1,6 @@
 """How a table is read: pairs, values chosen in hindsight, rows."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import NamedTuple
@@ -66,8 +67,8 @@ def best(found: Iterable[Cell]) -> dict[tuple[str, str], Cell]:
     return chosen
 
 
-def _order(cell: Cell) -> tuple[bool, float]:
-    return not cell.settled, cell.ratio
+def _order(cell: Cell) -> float:
+    return cell.ratio if cell.settled else math.inf
 
 
 def elsewhere(found: Sequence[Cell], cell: Cell, problem: str) -> Cell:

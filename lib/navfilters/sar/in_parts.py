@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-COLUMNS = 32  # of a matrix that are transformed at once: a few MB
-
 
 def blocks(n: int, most: int) -> list[slice]:
     """Slices of n lines, so many in each at most.

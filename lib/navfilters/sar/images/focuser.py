@@ -9,7 +9,7 @@ from scipy.constants import c
 from navfilters.numerics import validation
 from navfilters.sar.images.raw_data import RawData
 from navfilters.sar.images.slant_image import Image
-from navfilters.sar.in_parts import COLUMNS, blocks, in_threads
+from navfilters.sar.in_parts import blocks, in_threads
 from navfilters.sar.phase_blocks import (
     PIECE,
     Phase,
@@ -22,6 +22,9 @@ from navfilters.types import Array
 
 GUARD = 32
 """Samples on each side of a patch, over which it fades."""
+
+COLUMNS = 32
+"""Of a matrix that are transformed at once: a few MB."""
 
 
 class Focuser:

@@ -8,8 +8,8 @@ import numpy as np
 from scipy import fft
 from scipy.interpolate import CubicSpline
 
-from navfilters.sar.in_parts import COLUMNS, in_threads
 from navfilters.sar.in_parts import blocks as parts
+from navfilters.sar.in_parts import in_threads
 from navfilters.sar.raw.echoes_of_points import (
     Echoes,
     _half_aperture,
@@ -22,6 +22,7 @@ from navfilters.sar.raw.radar import LIGHT, Radar, Window
 from navfilters.types import Array
 
 ROWS = 64  # of a matrix that are transformed at once, 1 MB
+COLUMNS = 32  # the same of columns: a few MB
 PRODUCT = 2**16  # multiplications in a matrix product: so few that BLAS starts no threads
 
 
