@@ -214,28 +214,19 @@ class EarthFixedOrbit:
         xp = path.__array_namespace__()
         if not is_jax(xp):
             return padded(self.flight_transitions(path))
-        h, x = self.step, path[:-1]
+        hA = self.step * self.jacobian(self._between(path))
         if self.integrator == "printed":
-            hA = h * self.jacobian(x)
             bend = xp.asarray(POSITION.T @ POSITION) @ hA @ hA / 2  # of Eq. (11) alone
             return xp.eye(9) + hA + bend
-        hA = h * self.jacobian((x + path[1:]) / 2)
         return xp.eye(9) + hA + hA @ hA / 2
 
+    def _between(self, path: Array) -> Array:
+        """Where the derivative of each step is taken: as printed at its beginning."""
+        return path[:-1] if self.integrator == "printed" else (path[:-1] + path[1:]) / 2
+
     def flight_transitions(self, path: Array) -> Array:
-        """The same of position and velocity alone, under NumPy.
-
-        Parameters
-        ----------
-        path : array (k + 1, ..., 6)
-            States one step apart.
-
-        Returns
-        -------
-        array (k, ..., 6, 6)
-        """
-        h, printed, x = self.step, self.integrator == "printed", path[:-1]
-        at = x if printed else (x + path[1:]) / 2
+        """As :meth:`transitions`, of position and velocity alone, (k, ..., 6, 6), under NumPy."""
+        h, printed, at = self.step, self.integrator == "printed", self._between(path)
         # h A = [0, h I; G, V], V = [0, c, 0; -c, 0, 0; 0, 0, 0]. By elements: each is an array
         # over steps and members, which are many.
         G = np.moveaxis(self.gravity.gradient(at[..., :3]), (-2, -1), (0, 1)).copy()

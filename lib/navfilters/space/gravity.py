@@ -65,7 +65,7 @@ class Gravity:
         z2 = z * z
         s = 1 / (x * x + y * y + z2)
         of_sphere = (-self.mu * s) * xp.sqrt(s)
-        of_J2 = (self._k * s) * of_sphere
+        of_J2 = (self.of_J2 * s) * of_sphere
         along = of_sphere + of_J2 * (1 - (5 * s) * z2)
         if is_jax(xp):
             return xp.stack([x * along, y * along, z * (along + 2 * of_J2)], axis=-1)
@@ -93,24 +93,38 @@ class Gravity:
         ----------
         xiong2009, the F of Eq. (4) for Eq. (36).
         """
-        xp = r.__array_namespace__()
-        x, y, z = r[..., 0], r[..., 1], r[..., 2]
+        xp, batch = r.__array_namespace__(), r.shape[:-1]
+        rows = self.gradient_elements(r[..., 0], r[..., 1], r[..., 2])
+        G = xp.stack([element for row in rows for element in row], axis=-1)
+        return xp.reshape(G, (*batch, 3, 3))
+
+    def gradient_elements(self, x: Array, y: Array, z: Array) -> list[list[Array]]:
+        """The gradient by rows of its elements, for who puts them elsewhere.
+
+        Parameters
+        ----------
+        x, y, z : array (...)
+            Position, m.
+
+        Returns
+        -------
+        list of list of array (...)
+            s^-2.
+        """
         s = 1 / (x * x + y * y + z * z)
-        to_one = xp.sqrt(s)
+        to_one = x.__array_namespace__().sqrt(s)
         u, v, c = x * to_one, y * to_one, z * to_one  # unit vector
-        size, k = self.mu * s * to_one, self._k * s
+        size, k = self.mu * s * to_one, self.of_J2 * s
         of_u = size * (3 + k * (5 - 35 * c * c))
         of_x, of_y, of_z = of_u * u, of_u * v, of_u * c
         across, tilt = size * k, 10 * c
         up_x, up_y, up_z = across * (tilt * u), across * (tilt * v), across * (tilt * c - 1)
         same = size * (k * (5 * c * c - 1) - 1)
-        rows = [
+        return [
             [of_x * u + same, of_x * v, of_x * c + up_x],
             [of_y * u, of_y * v + same, of_y * c + up_y],
             [of_z * u + up_x, of_z * v + up_y, of_z * c + same + (up_z + up_z)],
         ]
-        G = xp.stack([element for row in rows for element in row], axis=-1)
-        return xp.reshape(G, (*x.shape, 3, 3))
 
     @property
     def fastest(self) -> float:
@@ -118,7 +132,8 @@ class Gravity:
         return float(np.sqrt(self.mu / self.radius**3))
 
     @property
-    def _k(self) -> float:
+    def of_J2(self) -> float:
+        """3/2 J2 R_e^2, m^2."""
         return 1.5 * self.J2 * self.radius**2
 
 

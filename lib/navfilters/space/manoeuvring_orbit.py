@@ -121,7 +121,7 @@ class ManoeuvringOrbit:
         n = x.shape[-1]
         A = np.zeros((*x.shape[:-1], n, n))
         A[..., :3, 3:6] = np.eye(3)
-        G = sub_steps.gradient(self.gravity, x[..., :3].transpose(-1, *range(x.ndim - 1)))
+        G = self.gravity.gradient_elements(x[..., 0], x[..., 1], x[..., 2])
         for i in range(3):
             for j in range(3):
                 A[..., 3 + i, j] = G[i][j]

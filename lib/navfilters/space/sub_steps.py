@@ -4,7 +4,6 @@ To the last bit what :class:`~navfilters.space.gravity.Gravity` and the Runge-Ku
 """
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -85,42 +84,7 @@ def _accelerate(numbers: tuple[np.ndarray, ...], stage: np.ndarray, thrust: Arra
 
 @lru_cache(maxsize=16)
 def _numbers(gravity: Gravity) -> tuple[np.ndarray, ...]:
-    return tuple(np.array(number) for number in (-gravity.mu, _of_J2(gravity), 1.0, 5.0))
-
-
-def gradient(gravity: Gravity, r: Array) -> list[list[Any]]:
-    """The gravity gradient by its elements.
-
-    Parameters
-    ----------
-    gravity : Gravity
-    r : array (3, ...)
-        Position, m.
-
-    Returns
-    -------
-    list of list of array (...)
-        s^-2.
-    """
-    squares = r * r
-    s = 1 / (squares[0] + squares[1] + squares[2])
-    to_one = np.sqrt(s)
-    u = r * to_one
-    c = u[2]
-    size, k = (gravity.mu * s) * to_one, _of_J2(gravity) * s
-    c2 = 5 * c * c
-    of_u = (size * (3 + k * (5 - 35 * c * c))) * u
-    upwards = (size * k) * ((10 * c) * u)
-    upwards[2] = (size * k) * (10 * c * c - 1)
-    G = [[of_u[i] * u[j] for j in range(3)] for i in range(3)]
-    same = size * (k * (c2 - 1) - 1)
-    for i in range(3):
-        G[i][i] = G[i][i] + same
-        if i < 2:
-            G[i][2] = G[i][2] + upwards[i]
-            G[2][i] = G[2][i] + upwards[i]
-    G[2][2] = G[2][2] + 2 * upwards[2]
-    return G
+    return tuple(np.array(number) for number in (-gravity.mu, gravity.of_J2, 1.0, 5.0))
 
 
 def transitions(
@@ -150,7 +114,7 @@ def transitions(
     F = np.empty((len(path) - 1, *path.shape[1:-1], 6, 6), path.dtype)
     out = F.mT if turned else F
     at = middle(path[:-1], path[1:], h)
-    G = gradient(gravity, at[..., :3].transpose(-1, *range(at.ndim - 1)))
+    G = gravity.gradient_elements(at[..., 0], at[..., 1], at[..., 2])
     for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)):
         one, g = float(i == j), G[i][j]
         squared = G[i][0] * G[0][j] + G[i][1] * G[1][j] + G[i][2] * G[2][j]
@@ -169,7 +133,3 @@ def transitions(
         A[..., 3:, 3:] = along_velocity(at[fires][..., 3:], thrust[fires])
         out[fires] = third_order(h * A)
     return F
-
-
-def _of_J2(gravity: Gravity) -> float:
-    return 1.5 * gravity.J2 * gravity.radius**2
