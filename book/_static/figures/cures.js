@@ -93,7 +93,7 @@
         if (!pair) says.replaceChildren(of, `: cannot act. The cure ${reasons[cure(shown.row)]?.[shown.patient] ?? "was not tried"}.`);
         else if (!pair.settled) {
           says.replaceChildren(of, pair.value === null ? "" : `, ${parameters[cure(shown.row)]} ${digits(pair.value)}`, ": ", element("b", {}, `${Math.round(100 * pair.lost)} % of the runs are lost`),
-            ". How far, and how sure the filter is, is decided by rounding.", pair.error.length ? "" : " Its course is not stored.");
+            ". How far, and how sure the filter is, is decided by rounding, and so is the course.", pair.error.length ? "" : " Its course is not stored.");
         } else {
           const with_ = pair.value === null ? "" : `, ${parameters[cure(shown.row)]} ${digits(pair.value)}`;
           says.replaceChildren(of, `${with_}: `, element("b", {}, pair.ratio === null ? "no number" : `${digits(pair.ratio)} times`), ` the reference of ${digits(reference)} ${unit}, `,

@@ -2,6 +2,7 @@
 
 import importlib
 import sys
+from argparse import ArgumentParser
 from collections.abc import Callable
 from typing import Any
 
@@ -51,6 +52,21 @@ def missing(module: str, install: str, what: str, error: ImportError) -> ImportE
     if error.name and f"{module}.".startswith(f"{error.name}."):
         return ImportError(f"{what} needs {name}: pip install {install}")
     return ImportError(f"{what} needs {name}, which is installed but not importable: {error}")
+
+
+def at_least(parser: ArgumentParser, option: str, value: int, least: int) -> None:
+    """End a command whose option is too small, with its usage.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+    option : str
+        With its dashes.
+    value, least : int
+        What was given, and what is needed.
+    """
+    if value < least:
+        parser.error(f"{option} must be at least {least}; found {value}")
 
 
 def command(main: Callable[[], None]) -> None:

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from navfilters.numerics.extras import command
+from navfilters.numerics.extras import at_least, command
 from navfilters.problems import stored
 from navfilters.problems.catalogue import problems
 from navfilters.problems.fresh import FRESH, fresh, fresh_report, write_fresh
@@ -29,8 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("--out", help=f"file of the result: {stored.FILE}, or {FRESH} by default")
     chosen = parser.parse_args(arguments)
-    if chosen.runs < 2:
-        parser.error(f"--runs must be at least 2; found {chosen.runs}")
+    at_least(parser, "--runs", chosen.runs, 2)
     if chosen.fresh:
         rows = fresh(stored.read(), problems(full=not chosen.quick), chosen.runs)
         write_fresh(chosen.out or FRESH, rows)

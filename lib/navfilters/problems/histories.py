@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from navfilters.numerics.extras import command
+from navfilters.numerics.extras import at_least, command
 from navfilters.problems.catalogue import problems
 from navfilters.problems.cures import Cure, UnfitError
 from navfilters.problems.later_cures import CURES
@@ -251,8 +251,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--runs", type=int, default=RUNS, help="of each pair")
     parser.add_argument("--out", default=FILE, help="file of the histories")
     chosen = parser.parse_args(arguments)
-    if chosen.runs < 1:
-        parser.error(f"--runs must be at least 1; found {chosen.runs}")
+    at_least(parser, "--runs", chosen.runs, 1)
     patients, found = problems(full=True).values(), []
     for problem in patients:
         sys.stderr.write(f"{problem.name}\n")

@@ -10,7 +10,7 @@ import numpy as np
 
 from navfilters.estimators.catalogue import FILTERS
 from navfilters.estimators.continuous import extended_kalman_bucy, linearized_kalman_bucy
-from navfilters.numerics.extras import command
+from navfilters.numerics.extras import at_least, command
 from navfilters.papers.lecture16.pendulum import Setup, discretised, sampled
 from navfilters.runs.loop import run
 from navfilters.runs.progress import bar
@@ -34,8 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("--step", type=float, default=0.005, help="of the discrete EKF, s")
     chosen = parser.parse_args(arguments)
-    if chosen.runs < 1:
-        parser.error(f"--runs must be at least 1; found {chosen.runs}")
+    at_least(parser, "--runs", chosen.runs, 1)
     if not 0 < chosen.step <= Setup.duration / 4:
         parser.error(f"--step must be above 0 and at most 5 s; found {chosen.step:g}")
     if not abs(chosen.released) <= np.pi:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from navfilters.numerics.extras import command, needed
+from navfilters.numerics.extras import at_least, command, needed
 from navfilters.papers.perea2007.divergence_maps import (
     AXES,
     noises,
@@ -39,8 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--noise", type=int, metavar="RUNS", help="so many noisy runs, no maps")
     chosen = parser.parse_args(arguments)
     if chosen.noise is not None:
-        if chosen.noise < 1:
-            parser.error(f"--noise must be at least 1; found {chosen.noise}")
+        at_least(parser, "--noise", chosen.noise, 1)
         _noise(chosen.noise)
         return
     if chosen.size < 2 or chosen.steps < 1:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from navfilters.numerics.extras import command
+from navfilters.numerics.extras import at_least, command
 from navfilters.papers.xiong2009.experiment import ESTIMATORS, VARIANTS
 from navfilters.papers.xiong2009.monte_carlo import rms_error
 from navfilters.papers.xiong2009.rivals import AFTER, END, IN_BURNS, RIVALS, course, fly_rival
@@ -93,8 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--seeds", type=int, default=20, help="number of runs")
     parser.add_argument("--rivals", action="store_true", help="other filters beside the paper's")
     chosen = parser.parse_args(arguments)
-    if chosen.seeds < 1:
-        parser.error(f"--seeds must be at least 1; found {chosen.seeds}")
+    at_least(parser, "--seeds", chosen.seeds, 1)
     text = (comparison if chosen.rivals else table)(
         chosen.variant, range(chosen.seeds), progress=progress_bar
     )
