@@ -176,6 +176,13 @@ def test_patch_refuses(samples, velocity, message):
         Focuser(hyperbola(7182.0)).patch(samples, velocity)
 
 
+def in_arrays():
+    """Bytes that arrays hold; what a tracer of coverage keeps for each thread is not theirs."""
+    of_numpy = tracemalloc.DomainFilter(True, np.lib.tracemalloc_domain)
+    snapshot = tracemalloc.take_snapshot().filter_traces([of_numpy])
+    return sum(trace.size for trace in snapshot.traces)
+
+
 def test_images_keep_and_take_no_more_memory_than_they_need():
     """At work: all lines of the image, and blocks; after twenty of them: nothing."""
     lines, samples = 512, 300
@@ -186,11 +193,12 @@ def test_images_keep_and_take_no_more_memory_than_they_need():
         before = tracemalloc.get_traced_memory()[0]
         for i in range(20):
             image = focuser.image(7182.0 + i)
-        after, most = tracemalloc.get_traced_memory()
+        most = tracemalloc.get_traced_memory()[1]
+        kept = in_arrays()
     finally:
         tracemalloc.stop()
     assert image.pixels.base is None
-    assert abs(after - before - image.pixels.nbytes) < 0.05 * image.pixels.nbytes
+    assert_allclose(kept, image.pixels.nbytes, rtol=0.01)
     padded = 8 * next_fast_len(2048) * samples
     assert most - before < padded + 2 * image.pixels.nbytes + 10 * 2**20  # of two blocks at work
 
