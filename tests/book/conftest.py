@@ -1,11 +1,14 @@
 """The built pages, parsed, and the same pages in a browser."""
 
 import os
+from functools import cache
 from pathlib import Path
 
 import browser as chromium
 import pytest
 from bs4 import BeautifulSoup
+
+OPEN = """document.querySelectorAll('.bd-article details').forEach(fold => { fold.open = true; })"""
 
 
 @pytest.fixture(scope="session")
@@ -17,11 +20,22 @@ def html():
     return folder
 
 
+@cache
+def _parsed(path: Path) -> BeautifulSoup:
+    return BeautifulSoup(path.read_text(encoding="utf-8"), "html.parser")
+
+
+@pytest.fixture(scope="session")
+def document(html):
+    """A built page by its name, parsed."""
+    return lambda name: _parsed(html / f"{name}.html")
+
+
 @pytest.fixture(scope="session")
 def documents(html) -> dict[Path, BeautifulSoup]:
     """Every built page, parsed, by its path."""
     paths = [p for p in html.rglob("*.html") if "_static" not in p.relative_to(html).parts]
-    return {p: BeautifulSoup(p.read_text(encoding="utf-8"), "html.parser") for p in paths}
+    return {path: _parsed(path) for path in paths}
 
 
 @pytest.fixture(scope="session")
@@ -34,8 +48,27 @@ def browser(html):
         yield site
 
 
-@pytest.fixture(scope="module", params=chromium.toc())
-def visit(browser, request):
-    """A page of the table of contents, loaded as on a first visit."""
+@pytest.fixture(scope="session", params=chromium.toc())
+def wide(browser, request):
+    """A page of the table of contents, loaded as on a first visit, with its folds open."""
     with browser.visit(request.param) as visit:
+        visit.page.evaluate(OPEN)
         yield visit
+
+
+@pytest.fixture(scope="session", params=chromium.toc())
+def narrow(browser, request):
+    """The same on a telephone."""
+    with browser.visit(request.param, width=390) as visit:
+        visit.page.evaluate(OPEN)
+        yield visit
+
+
+def pytest_collection_modifyitems(items):
+    """A worker takes all tests of a page, which is loaded once; of all pages; or of a module."""
+    pages = set(chromium.toc())
+    for item in items:
+        params = item.callspec.params.values() if hasattr(item, "callspec") else ()
+        page = next((p for p in params if isinstance(p, str) and p in pages), item.path.stem)
+        group = "documents" if "documents" in item.fixturenames else page
+        item.add_marker(pytest.mark.xdist_group(group))

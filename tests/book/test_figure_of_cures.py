@@ -162,8 +162,8 @@ def test_a_link_to_its_picture_leads_to_it(browser):
         }""")
 
 
-def test_without_scripts_the_table_is_all_there(documents, html):
-    soup = documents[html / f"{CHAPTER}.html"]
+def test_without_scripts_the_table_is_all_there(document):
+    soup = document(CHAPTER)
     table = soup.find("table", class_="cures")
     lines = {tr["id"]: tr.find_all("td") for tr in table.find("tbody").find_all("tr")}
     assert len(lines) == len(rows(STORED))
@@ -171,7 +171,7 @@ def test_without_scripts_the_table_is_all_there(documents, html):
     assert lines["cure-ukf"][2].get_text(strip=True).endswith("●")
 
 
-def test_the_whole_table_can_be_downloaded(documents, html):
-    path = html / f"{CHAPTER}.html"
-    link = documents[path].find("a", class_="download", href=lambda h: h.endswith(stored.FILE))
-    assert [c.ratio for c in read(path.parent / link["href"])][:5] == [c.ratio for c in STORED][:5]
+def test_the_whole_table_can_be_downloaded(document, html):
+    link = document(CHAPTER).find("a", class_="download", href=lambda h: h.endswith(stored.FILE))
+    table = (html / f"{CHAPTER}.html").parent / link["href"]
+    assert [c.ratio for c in read(table)][:5] == [c.ratio for c in STORED][:5]

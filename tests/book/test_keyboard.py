@@ -1,7 +1,6 @@
 """Every page by its keys alone: Tab reaches all that a mouse can use, shows where, and leaves."""
 
 import pytest
-from browser import toc
 
 CONTROLS = """() => {
     const list = [...document.querySelectorAll(
@@ -39,17 +38,15 @@ HERE = "() => document.activeElement.outerHTML.slice(0, 120)"
 OVER = "() => Boolean(window.over)"
 
 
-@pytest.mark.parametrize("name", toc())
-def test_tab_reaches_every_control_and_shows_it(browser, name):
-    with browser.visit(name) as visit:
-        page = visit.page
-        wanted = page.evaluate(CONTROLS)
-        assert wanted > 20  # a page has its table of contents at least
-        for pressed in range(2 * wanted + 40):
-            page.keyboard.press("Tab")
-            if pressed % 20 == 19 and page.evaluate(OVER):
-                break
-        else:
-            pytest.fail(f"focus never leaves the page; it is at {page.evaluate(HERE)}")
-        assert page.evaluate(MISSED) == []
-        assert page.evaluate("() => [...new Set(window.bare)]") == []
+def test_tab_reaches_every_control_and_shows_it(wide):
+    page = wide.page
+    wanted = page.evaluate(CONTROLS)
+    assert wanted > 20  # a page has its table of contents at least
+    for pressed in range(2 * wanted + 40):
+        page.keyboard.press("Tab")
+        if pressed % 20 == 19 and page.evaluate(OVER):
+            break
+    else:
+        pytest.fail(f"focus never leaves the page; it is at {page.evaluate(HERE)}")
+    assert page.evaluate(MISSED) == []
+    assert page.evaluate("() => [...new Set(window.bare)]") == []

@@ -138,6 +138,6 @@ def test_segments_of_the_front_page_open_what_they_count(browser):
         assert len(shown(visit.page)) == int(parts[0][0])
 
 
-def test_without_scripts_the_tables_are_there(html, documents):
-    soup = documents[html / f"{PAGE}.html"]
+def test_without_scripts_the_tables_are_there(document):
+    soup = document(PAGE)
     assert len(soup.select("details.claims-work[open] .claims-table tr[id]")) == len(LEDGER)

@@ -1,6 +1,5 @@
 """What a page loads: little, and MathJax where there is a formula."""
 
-import pytest
 from browser import toc
 
 LIMIT = 1.5 * 2**20
@@ -8,13 +7,11 @@ LOADED = """() => ['navigation', 'resource'].flatMap(kind => performance.getEntr
     .map(entry => [new URL(entry.name).pathname, entry.decodedBodySize])"""
 
 
-@pytest.mark.parametrize("name", toc())
-def test_a_page_is_light_and_has_mathjax_where_it_has_formulas(browser, name):
-    with browser.visit(name) as visit:
-        visit.page.evaluate("() => window.scrollTo(0, document.body.scrollHeight)")
-        visit.page.wait_for_load_state("networkidle")
-        loaded = visit.page.evaluate(LOADED)
-        formulas = visit.page.locator(".math").count()
+def test_a_page_is_light_and_has_mathjax_where_it_has_formulas(wide):
+    wide.page.evaluate("() => window.scrollTo(0, document.body.scrollHeight)")
+    wide.page.wait_for_load_state("networkidle")
+    loaded = wide.page.evaluate(LOADED)
+    formulas = wide.page.locator(".math").count()
     own = {path: size for path, size in loaded if "/mathjax/" not in path}
     assert sum(own.values()) < LIMIT, sorted(own.items(), key=lambda item: -item[1])[:5]
     assert any("/mathjax/" in path for path, _ in loaded) == (formulas > 0)

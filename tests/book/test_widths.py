@@ -1,11 +1,9 @@
 """Nothing is cut: a wide screen shows all, on a narrow one what is too wide scrolls visibly."""
 
 import pytest
-from browser import toc
 
-# Every piece that is wider than a box around it, and whether that scrolls. Folds are opened.
+# Every piece that is wider than a box around it, and whether that scrolls.
 WIDE = """() => {
-    document.querySelectorAll('.bd-article details').forEach(fold => { fold.open = true; });
     const article = document.querySelector('.bd-article').getBoundingClientRect();
     const found = new Map();
     const pieces = 'pre, table, .results, .math, img, svg, canvas, .claim, .sd-card';
@@ -38,17 +36,13 @@ INSERT = """style => {
 }"""
 
 
-@pytest.mark.parametrize("name", toc())
-def test_on_a_wide_screen_everything_fits(browser, name):
-    with browser.visit(name, width=1280) as visit:
-        assert visit.page.evaluate(WIDE) == []
+def test_on_a_wide_screen_everything_fits(wide):
+    assert wide.page.evaluate(WIDE) == []
 
 
-@pytest.mark.parametrize("name", toc())
-def test_on_a_narrow_screen_what_is_wide_scrolls_and_shows_it(browser, name):
-    with browser.visit(name, width=390) as visit:
-        assert [text for how, text in visit.page.evaluate(WIDE) if how != "scrolls"] == []
-        assert visit.page.evaluate("document.documentElement.scrollWidth") <= 390
+def test_on_a_narrow_screen_what_is_wide_scrolls_and_shows_it(narrow):
+    assert [text for how, text in narrow.page.evaluate(WIDE) if how != "scrolls"] == []
+    assert narrow.page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
 @pytest.mark.parametrize(
