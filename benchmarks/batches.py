@@ -3,7 +3,8 @@
 Both do the same runs with the same random numbers, on one core, in turns. The loop makes only a few
 of the runs, since each costs the same. Results are medians over the turns.
 
-The second part makes linear updates of two measurements for states of several sizes.
+The second part makes linear updates of two measurements for states of several sizes. The third
+splits the cost of a compiled series of one member into that of the call and that of an update.
 """
 
 import json
@@ -19,6 +20,8 @@ if hasattr(os, "sched_setaffinity"):
 
 import jax
 import numpy as np
+import peers_moving
+import problems
 
 from navfilters import FILTERS, Gaussian, sweep
 from navfilters.models import Linear
@@ -85,10 +88,39 @@ def grow(engine: str, n: int) -> float:
     return round(median(spent[1:]), 1)
 
 
+COMPILED = {"navfilters, JAX": peers_moving.ours("jax"), "dynamax": peers_moving.dynamax}
+SHORT, TURNS = 10, 25
+
+
+def split(problem: problems.Coasting | problems.Images) -> dict[str, dict[str, float]]:
+    """Microseconds of a call and of each update, by a short and a long series of one member."""
+    prior, lengths = problems.priors(problem, 1), (SHORT, problems.LONGEST)
+    spent = {}
+    for who, prepare in COMPILED.items():
+        series = [prepare(prior, problem.z, problem, steps) for steps in lengths]
+        times = []
+        for go in series:
+            go()  # compiles
+        for _ in range(TURNS):
+            for go in series:
+                start = time.process_time()
+                go()
+                times.append((time.process_time() - start) * 1e6)
+        short, long = median(times[::2]), median(times[1::2])
+        update = (long - short) / (lengths[1] - lengths[0])
+        spent[who] = {"call_us": round(short - SHORT * update), "update_us": round(update, 1)}
+    return spent
+
+
 def main() -> None:
     """Measure, print and write ``batches.json``."""
     jax.config.update("jax_enable_x64", True)
     result = {"date": date.today().isoformat(), "repeats": REPEATS, "results": {}, "sizes": {}}
+    result["calls"] = {
+        name: split(make())
+        for name, make in (("orbit EKF", problems.coasting), ("MEKF", problems.images))
+    }
+    sys.stdout.write(f"one member, compiled: {result['calls']}\n")
     for name, contest in CONTESTS.items():
         found = result["results"][name] = compare(*contest)
         sys.stdout.write(
