@@ -1,5 +1,7 @@
 """What a reader sees of the ledger."""
 
+import re
+
 import pytest
 from entries import ENTRY, finding, make
 
@@ -49,6 +51,28 @@ def test_the_badge_escapes_what_it_shows():
     for text in ("a &lt; b &amp; c", "x, &lt;i&gt;", "&lt;b&gt;", "&lt;s&gt;: 1"):
         assert text in html
     assert not any(tag in html for tag in ("<i>", "<b>", "<s>"))
+
+
+@pytest.mark.parametrize(
+    ("source", "read"),
+    [
+        ("perea2007, Eq. (1)", "Perea et al. 2007, Eq. (1)"),
+        (
+            "this book, on xiong2009 and sarkka2009",
+            "this book, on Xiong et al. 2009 and Särkkä and",
+        ),
+        ("someone1999, Fig. 1", "someone1999, Fig. 1"),
+    ],
+)
+def test_a_work_is_called_by_its_name(source, read):
+    assert f">{read}" in Badge(make(source=source))._repr_html_()
+
+
+def test_no_claim_of_the_book_shows_a_key_of_the_bibliography():
+    text = claims.find().with_name("references.bib").read_text(encoding="utf-8")
+    keys = re.compile("|".join(re.findall(r"^@\w+{([\w-]+),", text, re.M)))
+    shown = [Badge(c)._repr_html_() for c in claims.load().values()]
+    assert [html for html in shown if keys.search(html)] == []
 
 
 def test_summary_and_scorecard_count_and_list(ledger):

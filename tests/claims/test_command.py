@@ -16,7 +16,11 @@ def test_it_counts_the_verdicts_of_each_work(capsys):
     rows = capsys.readouterr().out.splitlines()
     said = sum(int(part.split()[0]) for row in rows[:-1] for part in row.split(": ")[1].split(", "))
     assert said == len(claims.load())
-    assert {row.split(":")[0] for row in rows} >= {"perea2007", "xiong2009", "this book"}
+    assert {row.split(":")[0] for row in rows} >= {
+        "Perea et al. 2007",
+        "Xiong et al. 2009",
+        "this book",
+    }
 
 
 def test_words_and_a_verdict_choose(capsys):
@@ -26,11 +30,17 @@ def test_words_and_a_verdict_choose(capsys):
     assert all(row.endswith(": not reproduced") for row in heads)
 
 
+@pytest.mark.parametrize("words", [["xiong2009", "AREKF"], ["Xiong", "2009", "arekf"]])
+def test_a_work_is_found_by_its_key_and_by_its_name(words, capsys):
+    assert ledger(words) == 0
+    assert "xiong-" in capsys.readouterr().out
+
+
 def test_one_claim_is_shown_whole(capsys):
     assert ledger(["own-map-bits"]) == 0
     text = " ".join(capsys.readouterr().out.split())
     claim = claims.load()["own-map-bits"]
-    for part in (claim.statement, claim.source, claim.chapter, claim.route):
+    for part in (claim.statement, "source: this book", claim.chapter, claim.route):
         assert " ".join(part.split()) in text
 
 

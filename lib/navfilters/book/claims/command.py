@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from .ledger import VERDICTS, Claim, ClaimError, load
-from .pages import plain, work_of
+from .pages import cited, named, plain, work_of
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -39,8 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     found = [
         claim
         for claim in ledger.values()
-        if chosen.verdict in (None, claim.verdict)
-        and all(w in f"{claim.id} {claim.source} {claim.statement}".lower() for w in asked)
+        if chosen.verdict in (None, claim.verdict) and all(word in _words(claim) for word in asked)
     ]
     if not found:
         sys.stderr.write("no claim has all of that\n")
@@ -50,11 +49,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
+def _words(claim: Claim) -> str:
+    return f"{claim.id} {claim.source} {cited(claim)} {claim.statement}".lower()
+
+
 def _counts(found: Sequence[Claim]) -> Iterable[str]:
     counts = Counter((work_of(claim), claim.verdict) for claim in found)
     for work in dict.fromkeys(work for work, _ in counts):
         said = ", ".join(f"{counts[work, v]} {v}" for v in VERDICTS if counts[work, v])
-        yield f"{work}: {said}"
+        yield f"{named(work)}: {said}"
     yield "A word, as in `navfilters claims ukf`, lists the claims that have it."
 
 
@@ -63,7 +66,7 @@ def _listed(found: Sequence[Claim]) -> Iterable[str]:
         yield f"{claim.id}: {claim.verdict}"
         yield from textwrap.wrap(claim.statement, 92, initial_indent="  ", subsequent_indent="  ")
         if len(found) == 1:
-            yield f"  source: {claim.source}; chapter: {claim.chapter}"
+            yield f"  source: {cited(claim)}; chapter: {claim.chapter}"
             yield f"  ours: {plain(claim.ours)}"
             why = claim.reason or claim.route
             yield from textwrap.wrap(why, 92, initial_indent="  ", subsequent_indent="  ")

@@ -1,6 +1,7 @@
 """What a reader sees of the ledger: badges, the summary, the rules."""
 
 import html
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,8 +23,15 @@ NAMES = {
     "lecture16": "Lecture 16",
     "xiong2009": "Xiong et al. 2009",
     "pogorelsky2020": "Pogorelsky et al. 2020",
+    "schmidt1966": "Schmidt 1966",
+    "blom1988": "Blom and Bar-Shalom 1988",
+    "sarkka2009": "Särkkä and Nummenmaa 2009",
+    "garcia2015": "García-Fernández et al. 2015",
+    "jiang2024": "Jiang et al. 2024",
 }
 """What a reader sees of a source; one without a name here is called by its key."""
+
+_KEYS = re.compile(rf"\b({'|'.join(NAMES)})\b")
 
 OF_A_SOURCE = tuple(verdict for verdict in VERDICTS if verdict != ESTABLISHED)
 
@@ -51,7 +59,7 @@ class Badge:
         return (
             f'<div class="claim claim-{slug(c.verdict)}" id="claim-{c.id}">'
             f'<span class="claim-verdict">{c.verdict}</span> {text(c.statement)} '
-            f'<a class="claim-source" href="{up}scorecard.html#row-{c.id}">{text(c.source)}</a>'
+            f'<a class="claim-source" href="{up}scorecard.html#row-{c.id}">{text(cited(c))}</a>'
             f'<div class="claim-numbers">{numbers}</div>{because(c)}</div>'
         )
 
@@ -99,7 +107,7 @@ def summary() -> Page:
             limit = f'<td class="claims-limit">{threshold}</td>'
             rows.append(f"<tr>{heading}{limit}{cells}</tr>")
             heading = ""
-            lines.append(f"{source} {threshold}: {found}")
+            lines.append(f"{named(source)} {threshold}: {found}")
     titles = "".join(
         f'<th class="claim-{slug(v)}"><span class="claim-verdict">{v}</span></th>'
         for v in OF_A_SOURCE
@@ -187,8 +195,14 @@ def named(work: str) -> str:
     return NAMES.get(work, work)
 
 
-def _place(claim: Claim) -> str:
-    return claim.source.partition(", ")[2] or claim.chapter.rpartition("/")[2]
+def cited(claim: Claim) -> str:
+    """A claim's source with every work called by its name."""
+    return _KEYS.sub(lambda key: NAMES[key[0]], claim.source)
+
+
+def place_of(claim: Claim) -> str:
+    """Where in its source a claim stands, or else its chapter."""
+    return cited(claim).partition(", ")[2] or claim.chapter.rpartition("/")[2]
 
 
 def slug(verdict: str) -> str:

@@ -7,7 +7,21 @@ from typing import Any
 from urllib.parse import urlencode
 
 from .ledger import OURS, PRINTED, VERDICTS, Claim, ClaimError, find, load
-from .pages import NAMES, OF_A_SOURCE, Badge, Page, because, named, plain, rich, slug, text, work_of
+from .pages import (
+    NAMES,
+    OF_A_SOURCE,
+    Badge,
+    Page,
+    because,
+    cited,
+    named,
+    place_of,
+    plain,
+    rich,
+    slug,
+    text,
+    work_of,
+)
 from .pages import table as table_of
 
 TITLES = {
@@ -62,12 +76,11 @@ def _folding(chosen: list[Claim], page: str) -> str:
 
 
 def _row(c: Claim) -> str:
-    place = c.source.partition(", ")[2] or c.chapter.rpartition("/")[2]
     paper = "" if c.paper_value is None else rich(c.paper_value)
     if c.threshold == OURS:
         paper = f'<span class="claim-reason">read as</span> {paper}'
     links = (
-        f'<a href="{c.chapter}.html#claim-{c.id}">{text(place)}</a> '
+        f'<a href="{c.chapter}.html#claim-{c.id}">{text(place_of(c))}</a> '
         f'<a class="claim-link" href="#row-{c.id}" title="link to this row">{c.id}</a>'
     )
     rule = f'<div class="claim-reason">Rule: {text(_rule(c))}</div>'
@@ -108,7 +121,7 @@ def database() -> Page:
         {
             "id": c.id,
             "paper": work_of(c),
-            "source": c.source,
+            "source": cited(c),
             "statement": c.statement,
             "kind": c.kind,
             "limit": c.threshold or "",
@@ -152,7 +165,7 @@ def bars() -> Page:
                 for v, n in found.items()
             )
             rows.append(f'<div class="bar"><span class="bar-limit">{limit}</span>{parts}</div>')
-            lines.append(f"{work} {limit}: {found}")
+            lines.append(f"{named(work)} {limit}: {found}")
     key = "".join(f'<span class="bar-key claim-{slug(v)}">{v}</span>' for v in OF_A_SOURCE)
     own = counts["this book", None, VERDICTS[-1]]
     last = f'<a href="{_filtered("this book")}">{own} findings of this book</a>'

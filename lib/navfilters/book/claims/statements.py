@@ -106,7 +106,7 @@ def statements() -> Page:
         listed = f"<details><summary>open ones</summary><ul>{missing}</ul></details>"
         cells = "".join(f"<td>{n}</td>" for n in numbers)
         rows.append(f"<tr><td>{_text(named(work))}{listed if missing else ''}</td>{cells}</tr>")
-        lines.append(f"{work}: {dict(zip(('all', *STATES), numbers, strict=True))}")
+        lines.append(f"{named(work)}: {dict(zip(('all', *STATES), numbers, strict=True))}")
     head = ("source", "statements", *STATES)
     return Page(table("claims-listing", head, rows), "\n".join(lines))
 
