@@ -230,7 +230,7 @@ def tiers(root: Path, file: str) -> list[list[str]]:
 
 
 def first_failure(root: Path, tests: list[str], seconds: float) -> str:
-    """What pytest names first, ``""`` if all passed, "stopped" at the time limit."""
+    """What pytest names first: ``""`` if all pass, "import" before tests, "stopped" at the limit."""
     environment = {**os.environ, "PYTHONPATH": str(root / "lib"), "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-m", "pytest", *PYTEST, *tests]
     try:
@@ -242,7 +242,7 @@ def first_failure(root: Path, tests: list[str], seconds: float) -> str:
     if ended.returncode in (0, 5):
         return ""
     named = re.search(r"^(?:FAILED|ERROR) (\S+)", ended.stdout, re.M)
-    return named.group(1) if named else "pytest itself"
+    return named.group(1) if named else "import"
 
 
 def seen(root: Path, mutant: Mutant, seconds: float) -> tuple[str, float]:
@@ -278,7 +278,8 @@ def main() -> None:
         for path in ROOT.glob("[!.]*.*"):
             if path.is_file():
                 shutil.copy(path, root)
-        clean: dict[str, bool] = {"": True, "stopped": True}
+        collected = not first_failure(root, ["--collect-only", "tests"], options.limit)
+        clean = {"": True, "stopped": True, "import": collected}
         for i, mutant in enumerate(chosen, 1):
             by, took = seen(root, mutant, options.limit)
             if by not in clean:  # a test that fails on the library as it is sees no mutant
