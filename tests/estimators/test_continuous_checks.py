@@ -71,6 +71,21 @@ def test_output_times_do_not_decide_the_residual(t):
     assert_allclose(residual, np.tile([0.0, 1.0], (len(times), 1)), atol=1e-9)
 
 
+def test_the_residual_is_each_pieces_average():
+    """x = t^3 under a rate of 10 t^9, averaged by hand over pieces of a 200th of the whole."""
+    system = ContinuousSystem(
+        lambda x, u, w, t: np.array([10 * t**9]) + w, lambda x, v, t: x + v, np.eye(1), np.eye(1)
+    )
+    times, residual = reference_residual(
+        system, Reference(lambda t: np.array([t**3])), np.array([0.0, 0.5, 0.5 + 1e-7, 2.0])
+    )
+    ends = np.linspace(0, 0.5, 51), np.linspace(0.5 + 1e-7, 2, 151)
+    a, b = (np.concatenate([piece[i : len(piece) - 1 + i] for piece in ends]) for i in (0, 1))
+    assert_allclose(times, (a + b) / 2, rtol=1e-13)
+    wanted = a**2 + a * b + b**2 - (b**10 - a**10) / (b - a)
+    assert_allclose(residual[:, 0], wanted, rtol=1e-9, atol=1e-9)
+
+
 def test_a_false_reference_is_rejected_with_the_residual_found():
     message = (
         r"reference must satisfy dx/dt = f\(x, u, w, t\) to 1e-06 of its rates; found a residual "

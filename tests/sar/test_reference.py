@@ -1,0 +1,37 @@
+"""A reference image, power by power and beyond its edges."""
+
+import numpy as np
+from numpy.testing import assert_allclose
+
+from navfilters.sar.matching.reference import _add, form_reference
+
+
+def test_power_is_shared_among_the_four_nearest_pixels():
+    """Beside a loop that gives each pixel the product of two hats; outside, nothing is left."""
+    rng = np.random.default_rng(0)
+    n, points = 7, 400
+    column, row = rng.uniform(-1.5, n + 0.5, (2, points))
+    power = rng.uniform(0.5, 2.0, points)
+    got, wanted = np.zeros(n * n, np.float32), np.zeros((n, n))
+    _add(got, n, column, row, power)
+    for x, y, p in zip(column, row, power, strict=True):
+        if 0 <= x < n - 1 and 0 <= y < n - 1:
+            hats = [np.maximum(0, 1 - np.abs(np.arange(n) - at)) for at in (x, y)]
+            wanted += p * np.outer(hats[1], hats[0])
+    assert_allclose(got.reshape(n, n), wanted, rtol=1e-5)
+    within = (column >= 0) & (column < n - 1) & (row >= 0) & (row < n - 1)
+    assert 100 < within.sum() < points
+    assert_allclose(got.sum(), power[within].sum(), rtol=1e-5)
+
+
+def test_a_small_reference_is_the_middle_of_a_large_one(acquired):
+    """With nearly no speckle. What lies beyond the edges is in both, and so is ground that relief
+    brings in; only the outermost ring of pixels lacks the shares of facets just outside.
+    """
+    view, scene = acquired.reference.view, acquired.scene
+    small, large = (
+        form_reference(scene, view, half_width=w, looks=1e12).values for w in (300.0, 900.0)
+    )
+    assert small.shape == (61, 61)
+    assert large.shape == (181, 181)
+    assert_allclose(small[1:-1, 1:-1], large[61:120, 61:120], atol=1e-3)
