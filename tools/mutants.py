@@ -230,7 +230,7 @@ def tiers(root: Path, file: str) -> list[list[str]]:
 
 
 def first_failure(root: Path, tests: list[str], seconds: float) -> str:
-    """What pytest names first: ``""`` if all pass, "import" before tests, "stopped" at the limit."""
+    """What pytest names first: ``""`` if all pass, "import" before tests, "stopped" if late."""
     environment = {**os.environ, "PYTHONPATH": str(root / "lib"), "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-m", "pytest", *PYTEST, *tests]
     try:
