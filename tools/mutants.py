@@ -241,7 +241,7 @@ def first_failure(root: Path, tests: list[str], seconds: float) -> str:
         return "stopped"
     if ended.returncode in (0, 5):
         return ""
-    named = re.search(r"^(?:FAILED|ERROR) (\S+)", ended.stdout, re.M)
+    named = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - |$)", ended.stdout, re.M)
     return named.group(1) if named else "import"
 
 
