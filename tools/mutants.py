@@ -289,8 +289,8 @@ def main() -> None:
             where = f"{i}  {mutant.file}:{mutant.line}  {mutant.kind}"
             sys.stdout.write(f"{where}  {by or 'SURVIVED'}  {took} s\n")
             sys.stdout.flush()
-            kinds = Counter("survived" if not r["seen_by"] else "seen" for r in rows)
-            kinds["stopped"] = sum(r["seen_by"] == "stopped" for r in rows)
+            apart = {"": "survived", "stopped": "stopped"}
+            kinds = Counter(apart.get(r["seen_by"], "seen") for r in rows)
             report = {"seed": options.seed, "count": len(rows), **kinds, "mutants": rows}
             options.store.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 
