@@ -39,7 +39,7 @@ test -z "$(2)" && $(1)/bin/python -c '$(WHOLE)' >/dev/null 2>&1 || $(PYTHON) -m 
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help book test unit coverage lint notebooks nbval elsewhere spread pages screens pdf dist serve bench mutants campaign lock clean
+.PHONY: help book test unit coverage lint notebooks nbval elsewhere spread pages screens pdf dist serve bench fuzz mutants campaign lock clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1  /p' $(MAKEFILE_LIST) | awk '{printf "  make %-10s", $$1; $$1 = ""; print}'
@@ -105,6 +105,9 @@ bench: $(BENCH)/.ready $(VENV)/.book  ## measure beside the peers and a C loop; 
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/run.py
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/batches.py
 	env -u OPENBLAS_CORETYPE $(BIN)/python benchmarks/imaging.py
+
+fuzz: $(VENV)/.test  ## the readers of files under much random damage: ten minutes
+	NAVFILTERS_FUZZ=20000 $(BIN)/pytest tests/test_fuzzing.py -n 2
 
 mutants: $(VENV)/.test  ## small faults put into the library one by one: how many do the unit tests see?
 	nice $(BIN)/python tools/mutants.py

@@ -230,7 +230,7 @@ def tiers(root: Path, file: str) -> list[list[str]]:
 
 
 def first_failure(root: Path, tests: list[str], seconds: float) -> str:
-    """What pytest names first: ``""`` if all pass, "import" before tests, "stopped" at the limit."""
+    """What pytest names first: ``""`` if all pass, "import" before tests, "stopped" if late."""
     environment = {**os.environ, "PYTHONPATH": str(root / "lib"), "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-m", "pytest", *PYTEST, *tests]
     try:
@@ -241,7 +241,7 @@ def first_failure(root: Path, tests: list[str], seconds: float) -> str:
         return "stopped"
     if ended.returncode in (0, 5):
         return ""
-    named = re.search(r"^(?:FAILED|ERROR) (\S+)", ended.stdout, re.M)
+    named = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - |$)", ended.stdout, re.M)
     return named.group(1) if named else "import"
 
 
@@ -289,8 +289,8 @@ def main() -> None:
             where = f"{i}  {mutant.file}:{mutant.line}  {mutant.kind}"
             sys.stdout.write(f"{where}  {by or 'SURVIVED'}  {took} s\n")
             sys.stdout.flush()
-            kinds = Counter("survived" if not r["seen_by"] else "seen" for r in rows)
-            kinds["stopped"] = sum(r["seen_by"] == "stopped" for r in rows)
+            apart = {"": "survived", "stopped": "stopped"}
+            kinds = Counter(apart.get(r["seen_by"], "seen") for r in rows)
             report = {"seed": options.seed, "count": len(rows), **kinds, "mutants": rows}
             options.store.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 

@@ -88,6 +88,7 @@ def test_the_satellite_is_told_no_leak_and_judged_by_the_batch_solution():
     from navfilters.problems.real_satellite import satellite
 
     patient = satellite()
+    assert patient.tested == tuple(range(6))  # position and velocity, of which the truth is told
     draw = patient.drawn(2)
     assert (draw.prior.cov[6:9] == 0).all()
     assert np.linalg.norm(draw.truth[-1, 0, 6:9]) > 1e-6  # and there is one

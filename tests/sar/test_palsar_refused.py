@@ -266,3 +266,11 @@ def test_errors_of_the_system_stay_its_own(tmp_path, monkeypatch):
     monkeypatch.setattr(leader_file, "open", deny, raising=False)
     with pytest.raises(PermissionError, match=f"LED-{NAME}"):
         open_product(tmp_path)
+
+
+@pytest.mark.parametrize("more", range(1, 12))
+def test_a_leader_that_ends_within_a_records_header_is_named(tmp_path, more):
+    """After the header's first byte of codes, too, where its kind is not yet known."""
+    product(tmp_path, IMAGE, LEADER[: 720 + more])
+    with pytest.raises(ValueError, match=f"LED-{NAME}, byte 720: "):
+        open_product(tmp_path)

@@ -172,7 +172,7 @@ def read_coefficients(path: Path, degree: int) -> tuple[np.ndarray, np.ndarray]:
     last = -1
     for where, line in _lines(path):
         words = line.split()
-        if len(words) < 4 or not (words[0].isdigit() and words[1].isdigit()):
+        if len(words) < 4 or not (words[0].isdecimal() and words[1].isdecimal()):
             raise ValueError(f"{where}: degree, order, C and S are needed; found {line}")
         n, m = int(words[0]), int(words[1])
         if m > n:
@@ -186,10 +186,16 @@ def read_coefficients(path: Path, degree: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _lines(path: Path) -> Iterator[tuple[str, str]]:
-    with open(path, encoding="utf-8") as file:
-        for number, line in enumerate(file, 1):
-            if (stripped := line.strip()) and not stripped.startswith("#"):
-                yield f"{path}, line {number}", stripped
+    with open(path, "rb") as file:
+        for number, raw in enumerate(file, 1):
+            where = f"{path}, line {number}"
+            try:
+                line = raw.decode("utf-8").strip()
+            except UnicodeDecodeError as error:
+                found = raw[error.start : error.end]
+                raise ValueError(f"{where}: text in UTF-8 is needed; found {found!r}") from None
+            if line and not line.startswith("#"):
+                yield where, line
 
 
 def _number(text: str, where: str) -> float:

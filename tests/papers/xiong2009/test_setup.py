@@ -47,6 +47,13 @@ def test_table_1_as_it_was_read_a_second_time():
     assert np.isnan(ESTIMATORS["EKF with thrust"].paper).all()
 
 
+def test_the_adaptive_filters_numbers_as_they_were_read_a_second_time():
+    """Under Eq. (44): a, the lags of Eq. (45) and the window; Eq. (47)'s alpha."""
+    noise_rule, robust = (ESTIMATORS[name].filter.rule for name in ("AEKF", "AREKF"))
+    assert (noise_rule.a, noise_rule.k, noise_rule.N) == (1.5, 2, 15)
+    assert robust.alpha == 0.2
+
+
 def test_constants_of_section_5():
     setup = Setup()
     assert_allclose(setup.x0[:3], [6878137, 0, 0])

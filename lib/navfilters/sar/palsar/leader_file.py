@@ -106,7 +106,7 @@ def _called(file: FileIO, which: str, start: int) -> str:
     """The number of a record, and its kind if that is known."""
     file.seek(start)
     codes = file.read(HEADER)[4:8]
-    name = _NAMES.get(codes[1]) if codes[:1] == b"\x12" else None
+    name = _NAMES.get(codes[1]) if len(codes) > 1 and codes[0] == 0x12 else None
     return f"{which} ({name})" if name else which
 
 
