@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from navfilters.numerics import validation
+from navfilters.numerics.analytic import dot
 from navfilters.numerics.loops import is_jax
 from navfilters.types import Array
 
@@ -63,11 +64,12 @@ class Gravity:
         xp = r.__array_namespace__()
         x, y, z = r[..., 0], r[..., 1], r[..., 2]
         z2 = z * z
-        s = 1 / (x * x + y * y + z2)
+        in_vectors = is_jax(xp)  # compiled derivatives by elements are up to eight times as slow
+        s = 1 / (dot(r, r) if in_vectors else x * x + y * y + z2)
         of_sphere = (-self.mu * s) * xp.sqrt(s)
         of_J2 = (self.of_J2 * s) * of_sphere
         along = of_sphere + of_J2 * (1 - (5 * s) * z2)
-        if is_jax(xp):  # in whole vectors: compiled derivatives of a stack are some times as slow
+        if in_vectors:
             up = xp.asarray([0.0, 0.0, 2.0], dtype=r.dtype)
             return r * (along[..., None] + of_J2[..., None] * up)
         pull = np.empty_like(r)  # in memory as r is
