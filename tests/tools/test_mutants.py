@@ -68,14 +68,15 @@ def test_every_edit_of_the_planted_code():
         ("a = b not in c", ("comparison", "not in", "in")),
         ("a = b ** c", ("arithmetic", "**", "*")),
         ("a = 'σ' if b else c % d", ("arithmetic", "%", "*")),
-        ("a.sort()", ("removed statement", "a.sort()", "pass")),
-        ("a[b] = c", ("removed statement", "a[b] = c", "pass")),
-        ("a += b", ("removed statement", "a += b", "pass")),
-        ("raise E('1 + 1')", ("removed statement", "raise E('1 + 1')", "pass")),
     ],
 )
 def test_each_kind(source, edit):
     assert edits(source) == {(1, *edit)}
+
+
+@pytest.mark.parametrize("statement", ["a.sort()", "a[b] = c", "a += b", "raise E('1 + 1')"])
+def test_a_statement_is_removed(statement):
+    assert edits(statement) == {(1, "removed statement", statement, "pass")}
 
 
 def test_a_mutant_is_one_edit():

@@ -64,6 +64,11 @@ def at_least(parser: ArgumentParser, option: str, value: int, least: int) -> Non
         With its dashes.
     value, least : int
         What was given, and what is needed.
+
+    Raises
+    ------
+    SystemExit
+        Naming the option, the value found and what is needed.
     """
     if value < least:
         parser.error(f"{option} must be at least {least}; found {value}")

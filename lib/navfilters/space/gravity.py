@@ -113,6 +113,10 @@ class Gravity:
         -------
         list of list of array (...)
             s^-2.
+
+        References
+        ----------
+        xiong2009, as for the gradient.
         """
         s = 1 / (x * x + y * y + z * z)
         to_one = x.__array_namespace__().sqrt(s)
