@@ -206,3 +206,30 @@ def test_a_member_that_fails_is_nan_alone():
         assert_array_equal(ours[others], wanted[others])
         assert np.isnan(ours[4]).all()
     assert first_indefinite(got.record).tolist() == [-1] * 4 + [1] + [-1] * 6
+
+
+LOOKED_AT: list[int] = []
+
+
+@dataclass(frozen=True)
+class Counted:
+    """Measures the state, and notes for how many at once."""
+
+    R: np.ndarray
+
+    def h(self, x):
+        LOOKED_AT.append(len(x))
+        return x
+
+    def jacobian(self, x):
+        return np.eye(2)
+
+
+def test_a_model_is_looked_at_once_for_problems_that_differ_in_numbers_alone():
+    """Also where their results differ in shape: with as many measurements as configurations."""
+    for looks, z in ((True, np.ones(2)), (False, np.zeros(2)), (True, np.ones((11, 2)))):
+        LOOKED_AT.clear()
+        got = quiet(EKF, priors(), z, Counted(np.eye(2)), 2)
+        assert (min(LOOKED_AT) < 11) == looks
+        wanted = run(EKF, priors(), z, Counted(np.eye(2)), 2)
+        assert_same(got.final, (wanted.mean[-1], wanted.cov[-1]))

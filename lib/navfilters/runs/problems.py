@@ -1,7 +1,7 @@
 """The arguments of a sweep: checked, taken apart, and dealt out in chunks."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import prod
 from typing import Any
 
@@ -9,7 +9,8 @@ import numpy as np
 
 from navfilters.numerics import validation
 from navfilters.runs import model_checks
-from navfilters.runs.march import Chunk, Job, March
+from navfilters.runs.chunks import compute
+from navfilters.runs.march import Chunk, Job, Kept, March
 from navfilters.runs.system_checks import compare_derivatives
 from navfilters.runs.trees import Leaf, Tree, flatten
 from navfilters.types import Gaussian
@@ -26,8 +27,9 @@ WORTH_A_PROCESS = 1e7
 SEVERAL = 3
 """Configurations that stand for a batch when the model's functions are looked at."""
 
-SOUND: set[tuple[Any, ...]] = set()
-"""Structures and shapes of problems whose models were called and found sound: once is enough."""
+FIRST: dict[tuple[Any, ...], Kept] = {}
+"""What one step of the first configuration gave, by structures and shapes of problems: their models
+were called and found sound, for which once is enough."""
 
 SENT = 2**26
 """Bytes of the series over the steps, given and kept, of a chunk."""
@@ -153,27 +155,44 @@ def _one_model(name: str, model: Any) -> tuple[Tree, list[Leaf]]:
     return tree, leaves
 
 
-def probe_models(job: Job, problem: Problem) -> None:
-    """Call the model's functions for one configuration and for several, as chunks of them will.
+def first_step(job: Job, problem: Problem) -> Kept:
+    """What one step of the first configuration keeps, its model's functions looked at before.
 
-    Once for problems that differ in numbers alone.
+    They are called for one configuration and for several, as chunks of them will be. Once for
+    problems that differ in numbers alone.
 
     Parameters
     ----------
     job : Job
     problem : Problem
 
+    Returns
+    -------
+    Kept
+        By its shapes and types what any configuration keeps.
+
     Raises
     ------
     ValueError
         As of :mod:`navfilters.runs.model_checks`.
+    SweepError
+        The filter or the model raised an exception.
     """
-    shapes = tuple((leaf.name, leaf.array.shape) for leaf in problem.leaves)
+    kinds = tuple((leaf.name, leaf.array.shape, leaf.array.dtype) for leaf in problem.leaves)
     jax = sys.modules.get("jax")
     doubles = jax is None or jax.config.jax_enable_x64  # where a model may be one of JAX
-    known = (job.engine, doubles, job.tree, shapes, min(job.steps, 1))
-    if job.tree.constant and known in SOUND:
-        return
+    steps = min(job.steps, 1)
+    known = (job.engine, doubles, job.tree, kinds, steps, job.z_per_step, job.complete)
+    if job.tree.constant and known in FIRST:
+        return FIRST[known]
+    _probe_models(job, problem)
+    kept = compute(replace(job, engine="numpy", steps=steps), problem.chunk(0, 1))
+    if job.tree.constant:
+        FIRST[known] = kept
+    return kept
+
+
+def _probe_models(job: Job, problem: Problem) -> None:
     for size in (1, SEVERAL):
         march = March(job, problem.chunk(0, size).arrays)
         try:
@@ -188,8 +207,6 @@ def probe_models(job: Job, problem: Problem) -> None:
                 "fields of a dataclass, not in a closure, and those that are no matrices say so: "
                 'field(metadata={"axes": number}).)'
             ) from error
-    if job.tree.constant:
-        SOUND.add(known)
 
 
 def _with_members(leaf: Leaf, batch: tuple[int, ...]) -> Leaf:

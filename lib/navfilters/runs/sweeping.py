@@ -7,7 +7,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import closing, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal
 from uuid import uuid4
@@ -23,7 +23,7 @@ from navfilters.runs import workers as places
 from navfilters.runs.checkpoints import Checkpoint
 from navfilters.runs.chunks import SweepError, compute
 from navfilters.runs.march import Chunk, Job, Kept
-from navfilters.runs.problems import WORTH_A_PROCESS, Problem, probe_models
+from navfilters.runs.problems import WORTH_A_PROCESS, Problem, first_step
 from navfilters.runs.results import Results
 from navfilters.types import Gaussian
 
@@ -168,7 +168,9 @@ def sweep(
     complete = problem.complete and not hasattr(model_parts.at(model, 0), "given")
     shared = problem.tree, problem.axes, problem.grid, steps, z_per_step, complete
     job = Job(engine, *shared, uuid4().hex)
-    results = Results(_probe(job, problem), problem.count, steps)
+    with _doubles(engine):
+        first = first_step(job, problem)
+    results = Results(first, problem.count, steps)
     size = min(chunk, problem.count) if chunk else problem.size(steps, results.series_bytes)
     if engine == "jax":
         from navfilters.runs.compiled import whole_blocks
@@ -179,14 +181,6 @@ def sweep(
         store = Checkpoint(checkpoint, job, problem.leaves, size, results.tree)
     _fill(results, job, problem, size, store, _place(job, problem, client, workers), progress)
     return Sweep(*results.collect(problem.batch))
-
-
-def _probe(job: Job, problem: Problem) -> Kept:
-    """One step of the first configuration, once its model is known to be sound."""
-    one = replace(job, engine="numpy", steps=min(job.steps, 1))
-    with _doubles(job.engine):
-        probe_models(job, problem)
-        return compute(one, problem.chunk(0, 1))
 
 
 def _doubles(engine: str) -> Any:
@@ -241,14 +235,13 @@ class _NoBar:
 
 
 def _bar(total: int, progress: bool | Callable[[int], Any]) -> Any:
-    if callable(progress):
-        return nullcontext(_NoBar(progress))
+    if callable(progress) or not progress:
+        return nullcontext(_NoBar(progress or None))
     try:
         from tqdm import tqdm
     except ImportError:
         return nullcontext(_NoBar())
-    hidden = None if progress else True  # None: unless standard error is a terminal
-    return tqdm(total=total, unit=" configurations", disable=hidden)
+    return tqdm(total=total, unit=" configurations", disable=None)  # unless it is no terminal
 
 
 def _fill(

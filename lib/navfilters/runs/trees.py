@@ -86,7 +86,7 @@ class Tree:
             return self.fixed.value is None
         return all(part.only_arrays for part in self.parts)
 
-    @property
+    @cached_property
     def constant(self) -> bool:
         """Whether all that is fixed in it is :attr:`Fixed.constant`."""
         return (self.fixed is None or self.fixed.constant) and all(p.constant for p in self.parts)
