@@ -226,7 +226,7 @@ class Counted:
 
 
 def test_a_model_is_looked_at_once_for_problems_that_differ_in_numbers_alone():
-    """Also where their results differ in shape: with as many measurements as configurations."""
+    """Of another shape, one measurement for each configuration, they are another problem."""
     for looks, z in ((True, np.ones(2)), (False, np.zeros(2)), (True, np.ones((11, 2)))):
         LOOKED_AT.clear()
         got = quiet(EKF, priors(), z, Counted(np.eye(2)), 2)
