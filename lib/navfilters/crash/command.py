@@ -3,9 +3,11 @@
 import argparse
 import importlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 from navfilters.crash.suite import CHECKS, SUITES, crash_test
@@ -27,13 +29,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="navfilters crash-test",
         description="Put a filter through what this book knows.",
-        epilog="Checks: " + "; ".join(f"{c.name}: {c.rule}" for c in CHECKS.values()),
+        epilog="checks, and what passes:\n" + "\n".join(_rules()),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "filter", metavar="MODULE:NAME", help="importable from here: mine:my_filter"
     )
     parser.add_argument("--suite", default="quick", choices=SUITES)
-    parser.add_argument("--check", action="append", choices=CHECKS, help="only this; repeatable")
+    parser.add_argument(
+        "--check",
+        action="append",
+        choices=CHECKS,
+        metavar="NAME",
+        help="only this, of those below, as in --check 'fix, noisy'; repeatable",
+    )
     parser.add_argument(
         "--workers", type=int, help="processes for a filter of one state; one per core by default"
     )
@@ -53,6 +62,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if chosen.json:
         chosen.json.write_text(report.json(), encoding="utf-8")
     return int(not report.passed)
+
+
+def _rules() -> Iterator[str]:
+    """The names of checks of one rule, and the rule."""
+    for rule, checks in groupby(CHECKS.values(), key=lambda check: check.rule):
+        yield fill("; ".join(check.name for check in checks), 79, initial_indent="  ")
+        yield fill(rule, 79, initial_indent=" " * 6, subsequent_indent=" " * 6)
 
 
 def imported(where: str) -> Any:
