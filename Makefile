@@ -39,7 +39,7 @@ test -z "$(2)" && $(1)/bin/python -c '$(WHOLE)' >/dev/null 2>&1 || $(PYTHON) -m 
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help book test unit coverage lint notebooks nbval elsewhere spread pages screens pdf dist serve bench fuzz mutants campaign lock clean
+.PHONY: help book test unit coverage lint notebooks nbval elsewhere spread pages screens pdf dist serve bench fuzz faults shuffled mutants campaign lock clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1  /p' $(MAKEFILE_LIST) | awk '{printf "  make %-10s", $$1; $$1 = ""; print}'
@@ -108,6 +108,12 @@ bench: $(BENCH)/.ready $(VENV)/.book  ## measure beside the peers and a C loop; 
 
 fuzz: $(VENV)/.test  ## the readers of files under much random damage: ten minutes
 	NAVFILTERS_FUZZ=20000 $(BIN)/pytest tests/test_fuzzing.py -n 2
+
+faults: $(VENV)/.test  ## sweeps and campaigns killed at random instants and resumed: the same bytes?
+	nice $(BIN)/python tools/kills.py
+
+shuffled: $(VENV)/.test  ## the quick unit tests in a random order, which is told and can be repeated
+	PYTHONPATH="$(CURDIR)/tools" $(BIN)/pytest tests --ignore tests/book -n 2 -m "not slow" -p shuffled
 
 mutants: $(VENV)/.test  ## small faults put into the library one by one: how many do the unit tests see?
 	nice $(BIN)/python tools/mutants.py

@@ -7,6 +7,8 @@ import importlib
 import io
 import json
 import re
+import tomllib
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -120,6 +122,7 @@ def lighter(app, exception) -> None:
         mend(page)
     few_icons(out)
     few_characters(out / "_static")
+    licences(out / "_static" / "licences")
     for picture in sorted((out / "_images").glob("*.png")):
         with_palette(picture)
 
@@ -189,6 +192,27 @@ def few_characters(static: Path) -> None:
         reduced.populate(unicodes=wanted)
         reduced.subset(font)
         subset.save_font(font, path, options)
+
+
+def licences(folder: Path) -> None:
+    """The licences of what the pages load, as book/licences.toml lists it; one file a package."""
+    listed = (FOLDER.parent / "book" / "licences.toml").read_text(encoding="utf-8")
+    folder.mkdir(exist_ok=True)
+    for work in tomllib.loads(listed)["work"]:
+        if package := work.get("package"):
+            texts = [FOLDER.parent / work["text"]] if "text" in work else _texts(package)
+            content = "\n".join(path.read_text(encoding="utf-8") for path in texts)
+            (folder / f"{package}.txt").write_text(content, encoding="utf-8")
+
+
+def _texts(package: str) -> list[Path]:
+    files = metadata.files(package) or []
+    found = [f for f in files if re.match("(LICENSE|COPYING)", f.name) and ".dist-info" in str(f)]
+    if not found:
+        raise FileNotFoundError(
+            f"{package} has no file of its licence; book/licences.toml needs text"
+        )
+    return [Path(str(f.locate())) for f in sorted(found)]
 
 
 def with_palette(path: Path) -> None:

@@ -18,6 +18,7 @@ from navfilters.papers.pogorelsky2020.experiment import CASES
 from navfilters.papers.pogorelsky2020.image_tables import assumed_speeds
 from navfilters.papers.pogorelsky2020.imaging import Imaging
 from navfilters.papers.pogorelsky2020.open_loop import monte_carlo
+from navfilters.runs.locked_folder import LOCK, alone_in
 
 pytestmark = pytest.mark.slow
 
@@ -46,7 +47,8 @@ class Work:
 
 
 def contents(folder):
-    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+    files = (path for path in sorted(folder.iterdir()) if path.name != LOCK)
+    return {path.name: path.read_bytes() for path in files}
 
 
 @pytest.fixture(scope="module")
@@ -168,6 +170,18 @@ def test_refusals(tmp_path, arguments, message):
     with pytest.raises(ValueError, match=message):
         campaign(tmp_path / "new", **arguments)
     assert not (tmp_path / "new").exists()
+
+
+def test_a_folder_that_another_uses_or_none_can_write_ends_the_command(tmp_path, capsys):
+    (tmp_path / "a file").write_text("not a folder")
+    with alone_in(tmp_path / "used"):
+        for name, said in (("used", "another process works in this"), ("a file", "can be written")):
+            with pytest.raises(SystemExit):
+                command.main(["--campaign", str(tmp_path / name)])
+            told = capsys.readouterr().err
+            assert said in told
+            assert str(tmp_path / name) in told
+    assert (tmp_path / "a file").read_text() == "not a folder"
 
 
 def test_the_command_prints_what_it_found(whole, monkeypatch, capsys):

@@ -167,3 +167,6 @@ def test_own_images_are_flown_and_stored(monkeypatch, tmp_path, capsys):
     with pytest.raises(SystemExit):
         command.main(["--out", "own.npz"])
     assert "--out must come with --own-images" in capsys.readouterr().err
+    with pytest.raises(SystemExit):  # before hours of computing, and not after
+        command.main(["--own-images", "--out", str(tmp_path / "none" / "own.npz")])
+    assert "--out must be in a folder that exists" in capsys.readouterr().err

@@ -210,7 +210,12 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
 
 def _parquet(path: Path) -> dict[str, np.ndarray]:
     parquet = needed("pyarrow.parquet", "pyarrow", "a log in Parquet")
-    table = parquet.read_table(path)
+    try:
+        table = parquet.read_table(path)
+    except FileNotFoundError:
+        raise
+    except Exception as error:  # pyarrow raises nearly anything
+        raise LogError(f"{path}: a Parquet file is needed; found: {error}") from None
     columns = {}
     for name in table.column_names:
         values = table[name].to_numpy()

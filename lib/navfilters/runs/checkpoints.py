@@ -19,7 +19,6 @@ class Checkpoint:
     Parameters
     ----------
     folder : path
-        Made if it does not exist.
     job : Job
     leaves : list of Leaf
         Of its tree, for all members.
@@ -37,7 +36,6 @@ class Checkpoint:
     def __init__(self, folder: Any, job: Job, leaves: list[Leaf], size: int, result: Tree) -> None:
         self.folder, self.result = Path(folder), result
         self.job = _fingerprint(job, leaves, size)
-        self.folder.mkdir(parents=True, exist_ok=True)
 
     def path(self, number: int) -> Path:
         """Where a chunk is."""

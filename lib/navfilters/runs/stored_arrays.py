@@ -4,6 +4,7 @@ import io
 import os
 import zipfile
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -33,10 +34,24 @@ def write(path: Path, content: bytes) -> None:
     ----------
     path : Path
     content : bytes
+
+    Raises
+    ------
+    OSError
+        They cannot be written; naming the file, which is as it was.
     """
     unfinished = path.with_name(path.name + ".part")
-    unfinished.write_bytes(content)
-    os.replace(unfinished, path)
+    try:
+        with unfinished.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())  # else a power cut may leave the name without the content
+        os.replace(unfinished, path)
+    except OSError as error:
+        with suppress(OSError):
+            unfinished.unlink()
+        why = "what was stored before is whole; call again once this can be written"
+        raise OSError(error.errno, f"{error.strerror or error}; {why}", str(path)) from error
 
 
 def load(
@@ -62,15 +77,20 @@ def load(
     ------
     ValueError
         The file is damaged, or another job's; naming it.
+    OSError
+        It is there and cannot be read.
     """
-    if not path.exists():
+    try:
+        content = io.BytesIO(path.read_bytes())
+    except FileNotFoundError:
         return None
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(content) as archive:
             damaged = archive.testzip()
         if damaged:
             raise zipfile.BadZipFile(f"bad checksum of {damaged}")
-        with np.load(path, allow_pickle=False) as file:
+        content.seek(0)
+        with np.load(content, allow_pickle=False) as file:
             ours = str(file["job"]) == job
             arrays = [file[name] for name in names if ours]
     except Exception as error:  # zipfile and NumPy raise nearly anything

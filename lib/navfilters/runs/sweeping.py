@@ -22,6 +22,7 @@ from navfilters.runs import model_checks
 from navfilters.runs import workers as places
 from navfilters.runs.checkpoints import Checkpoint
 from navfilters.runs.chunks import SweepError, compute
+from navfilters.runs.locked_folder import alone_in
 from navfilters.runs.march import Chunk, Job, Kept
 from navfilters.runs.problems import WORTH_A_PROCESS, Problem, first_step
 from navfilters.runs.results import Results
@@ -127,6 +128,9 @@ def sweep(
         result is missing, or is not of the shape and type of the first configuration's.
     TimeoutError
         A cluster without workers.
+    OSError
+        A checkpoint folder that cannot be written, or in which another process is at work
+        (BlockingIOError).
     KeyboardInterrupt
         Says how many configurations were finished, and whether they can be used.
 
@@ -177,9 +181,12 @@ def sweep(
 
         size = whole_blocks(size)
     store = None
+    alone: Any = nullcontext()
     if checkpoint is not None:
         store = Checkpoint(checkpoint, job, problem.leaves, size, results.tree)
-    _fill(results, job, problem, size, store, _place(job, problem, client, workers), progress)
+        alone = alone_in(store.folder)
+    with alone:
+        _fill(results, job, problem, size, store, _place(job, problem, client, workers), progress)
     return Sweep(*results.collect(problem.batch))
 
 

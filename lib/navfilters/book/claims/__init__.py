@@ -8,6 +8,7 @@ found to equal.
 """
 
 from .checking import check
+from .entries import ClaimError
 from .essay import omissions, told, verdicts_of
 from .ledger import (
     ESTABLISHED,
@@ -18,7 +19,6 @@ from .ledger import (
     UNDERDETERMINED,
     VERDICTS,
     Claim,
-    ClaimError,
     Word,
     find,
     load,

@@ -4,7 +4,8 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
-from .ledger import ClaimError, find, load
+from .entries import ClaimError
+from .ledger import find, load
 from .pages import Badge, plain
 from .verdicts import derive, near
 

@@ -7,7 +7,8 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from .ledger import VERDICTS, Claim, ClaimError, load
+from .entries import ClaimError
+from .ledger import VERDICTS, Claim, load
 from .pages import cited, named, plain, work_of
 
 

@@ -4,7 +4,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .ledger import VERDICTS, Claim, ClaimError, load
+from .entries import ClaimError
+from .ledger import VERDICTS, Claim, load
 from .pages import Page, named, plain, rich, slug, work_of
 from .pages import table as table_of
 

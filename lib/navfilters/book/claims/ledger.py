@@ -1,11 +1,12 @@
 """Entries of the ledger, and what each of them must say."""
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
+
+from .entries import ClaimError, listed, made, tables
 
 REPRODUCED, IN_SHAPE = "reproduced", "reproduced in shape"
 UNDERDETERMINED = "underdetermined"
@@ -23,10 +24,6 @@ _SHAPE_KEYS = {
     "order": {"swaps"},
     "boolean": set(),
 }
-
-
-class ClaimError(AssertionError):
-    """A fresh value that does not give the recorded verdict, or an entry that is not one."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +170,7 @@ def _faults_of_source(claim: Claim) -> Iterator[str]:
         yield f"a printed number's shape_rule is {SHAPE_OF_A_NUMBER}; found {claim.shape_rule}"
     if claim.quantifier not in ("", "some"):
         yield f"quantifier can only be 'some'; found {claim.quantifier!r}"
-    if any(set(old) != {"was", "why"} for old in claim.revised):
+    if any(not isinstance(old, dict) or set(old) != {"was", "why"} for old in claim.revised):
         yield f"revised is a list of tables of was and why; found {claim.revised!r}"
 
 
@@ -280,21 +277,24 @@ def load_words(path: Path | None = None) -> dict[str, Word]:
 
 @cache
 def _load(path: Path, stamp: int) -> tuple[dict[str, Claim], dict[str, Word]]:
-    table = tomllib.loads(path.read_text(encoding="utf-8"))
-    words = {name: _make(Word, name, entry) for name, entry in table.get("word", {}).items()}
+    table = tables(path)
+    try:
+        return _entries(table)
+    except ClaimError as error:
+        raise ClaimError(f"{path}: {error}") from None
+
+
+def _entries(table: dict[str, Any]) -> tuple[dict[str, Claim], dict[str, Word]]:
+    named = table.get("word", {})
+    if not isinstance(named, dict):
+        raise ClaimError(f"tables [word.name] are needed; found {named!r}")
+    words = {name: made(Word, name, entry) for name, entry in named.items()}
     ledger: dict[str, Claim] = {}
-    for entry in table["claim"]:
-        claim = _make(Claim, entry.get("id", "an entry without id"), entry)
+    for entry in listed(table, "claim"):
+        claim = made(Claim, str(entry.get("id", "an entry without id")), entry)
         if claim.id in ledger:
             raise ClaimError(f"{claim.id}: two entries of this id")
         if fault := _fault_of_word(claim, words):
             raise ClaimError(f"{claim.id}: {fault}")
         ledger[claim.id] = claim
     return ledger, words
-
-
-def _make(kind: type, name: str, entry: Mapping[str, Any]) -> Any:
-    try:
-        return kind(**entry)
-    except TypeError as error:
-        raise ClaimError(f"{name}: {error}") from None

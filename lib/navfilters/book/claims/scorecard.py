@@ -6,7 +6,8 @@ from html import escape
 from typing import Any
 from urllib.parse import urlencode
 
-from .ledger import OURS, PRINTED, VERDICTS, Claim, ClaimError, find, load
+from .entries import ClaimError
+from .ledger import OURS, PRINTED, VERDICTS, Claim, find, load
 from .pages import (
     NAMES,
     OF_A_SOURCE,

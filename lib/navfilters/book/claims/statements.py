@@ -1,13 +1,13 @@
 """What the sources state, sentence by sentence, and how much of it the ledger checks."""
 
 import html
-import tomllib
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .ledger import ClaimError, find
+from .entries import ClaimError, listed, made, tables
+from .ledger import find
 from .pages import Page, named, table
 
 
@@ -42,7 +42,7 @@ class Statement:
     section: str
     what: str
     text: str
-    claims: tuple[Any, ...] = ()
+    claims: tuple[Any, ...] | list[Any] = ()
     set_aside: str = ""
     open: str = ""
     shown: str = ""
@@ -74,7 +74,16 @@ def load_statements(path: Path | None = None) -> list[Statement]:
         An entry that is not exactly one of checked, set aside and open, or two of one id.
     """
     path = path or find().parent / "statements.toml"
-    found = [Statement(**e) for e in tomllib.loads(path.read_text(encoding="utf-8"))["statement"]]
+    table = tables(path)
+    try:
+        return _sound(table)
+    except ClaimError as error:
+        raise ClaimError(f"{path}: {error}") from None
+
+
+def _sound(table: dict[str, Any]) -> list[Statement]:
+    entries = listed(table, "statement")
+    found = [made(Statement, str(e.get("id", "an entry without id")), e) for e in entries]
     for statement in found:
         if bool(statement.claims) + bool(statement.set_aside) + bool(statement.open) != 1:
             raise ClaimError(f"{statement.id}: exactly one of claims, set_aside and open")

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from .entries import ClaimError
 from .ledger import (
     ESTABLISHED,
     IN_SHAPE,
@@ -11,7 +12,6 @@ from .ledger import (
     REPRODUCED,
     UNDERDETERMINED,
     Claim,
-    ClaimError,
 )
 
 _WORST_LAST = (REPRODUCED, IN_SHAPE, UNDERDETERMINED, NOT_REPRODUCED)

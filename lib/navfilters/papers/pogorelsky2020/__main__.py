@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from navfilters.numerics.extras import command
 from navfilters.papers.pogorelsky2020.antenna_tables import antenna_table
@@ -122,6 +123,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         parser.error("--direct must come with --campaign")
     if chosen.out is not None and not chosen.own_images:
         parser.error("--out must come with --own-images")
+    if chosen.out is not None and not Path(chosen.out).parent.is_dir():
+        parser.error(f"--out must be in a folder that exists; found {chosen.out}")
     if chosen.palsar is not None:
         needed = ("closed_loop", "dem", "reference")
         if absent := [name.replace("_", "-") for name in needed if not getattr(chosen, name)]:

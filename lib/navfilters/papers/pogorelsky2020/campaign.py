@@ -17,6 +17,7 @@ from navfilters.papers.pogorelsky2020.image_tables import ImageTable, assumed_sp
 from navfilters.papers.pogorelsky2020.imaging import FULL, Acquisition, Imaging, same_images
 from navfilters.papers.pogorelsky2020.open_loop import MonteCarlo, monte_carlo
 from navfilters.runs import stored_arrays
+from navfilters.runs.locked_folder import alone_in
 from navfilters.runs.progress import bar
 from navfilters.space.image_measurement import Measurement
 from navfilters.space.navigation_state import NavigationState
@@ -100,6 +101,8 @@ def run_campaign(
     ------
     ValueError
         Bad counts; a stored file that is damaged, or that other arguments made.
+    OSError
+        A folder that cannot be written, or in which another process is at work (BlockingIOError).
 
     References
     ----------
@@ -109,7 +112,12 @@ def run_campaign(
     if validation.whole_number("direct", direct, 0) > runs:
         raise ValueError(f"direct must be at most runs, {runs}; found {direct}")
     store = Folder(Path(folder), imaging, validation.whole_number("seed", seed, 0))
-    store.path.mkdir(parents=True, exist_ok=True)
+    with alone_in(store.path):
+        return _run(store, runs, direct, progress)
+
+
+def _run(store: Folder, runs: int, direct: int, progress: Callable[..., Any]) -> Campaign:
+    seed, imaging = store.seed, store.imaging
     with progress(_work(store, direct)) as done:
         tables = [_table(store, k, done) for k in range(1, UPDATES + 1)]
         lookup = lambda setup, k, imaging: tables[k - 1]  # noqa: E731
