@@ -104,6 +104,7 @@ serve: $(VENV)/.book  ## the book at http://localhost:8000, built again when a p
 bench: $(BENCH)/.ready $(VENV)/.book  ## measure beside the peers and a C loop; store the results in benchmarks/
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/run.py
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/batches.py
+	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/growth.py
 	env -u OPENBLAS_CORETYPE $(BIN)/python benchmarks/imaging.py
 
 fuzz: $(VENV)/.test  ## the readers of files under much random damage: ten minutes

@@ -70,7 +70,7 @@ def compare(experiment, runs: range, some: int) -> dict[str, float]:
     }
 
 
-SIZES = (2, 3, 4, 6, 9, 12)
+SIZES = (2, 3, 4, 6, 9, 12, 20, 30)
 MEMBERS, STEPS = 10_000, 20
 
 

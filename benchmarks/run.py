@@ -1,12 +1,12 @@
 """Measure the library beside its peers on one core, and store the result: ``make bench``.
 
-Three problems, the same numbers for all: perea2007's static one, a prior around the paper's and its
-perfect measurement at every step; and the two in motion of ``problems``. All contenders of a filter
-and a batch size take turns; in each turn all are timed once. A result is the median over the turns,
-of the time per update (with the prediction before it) and of its ratio to C's in that turn. Time is
-the processor's for this process, so that others on the machine disturb it less; no contender waits
-for anything. Contenders that make one update after another for one member after another cost the
-same per update for any batch: of them a few members are enough.
+Three problems, the same numbers for all: the static one of Perea et al., a prior around theirs and
+a perfect measurement at every step; and the two in motion of ``problems``. All contenders of a
+filter and a batch size take turns; in each turn all are timed once. A result is the median over the
+turns, of the time per update (with the prediction before it) and of its ratio to C's in that turn.
+Time is the processor's for this process, so that others on the machine disturb it less; no
+contender waits for anything. Contenders that make one update after another for one member after
+another cost the same per update for any batch: of them a few members are enough.
 """
 
 import argparse
@@ -129,7 +129,7 @@ MODELS = (
 
 PROBLEMS = {
     "static": Problem(
-        "static range-bearing update of perea2007, 2 states",
+        "static range-bearing update of Perea et al., 2 states",
         ("EKF", "UKF"),
         (1000, 1000, 300, 50),
         {"filterpy": 4000, "Stone Soup": 400},
@@ -140,8 +140,8 @@ PROBLEMS = {
         "Stone Soup's UKF averages bearings on the circle, as no other does",
     ),
     "orbit": Problem(
-        "angles between stars and the Earth of xiong2009, 6 states: 10 Runge-Kutta steps of 10 s "
-        "with their Jacobians, then 2 angles",
+        "angles between stars and the Earth of Xiong et al., 6 states: 10 Runge-Kutta steps of "
+        "10 s with their Jacobians, then 2 angles",
         ("orbit EKF",),
         (90, 90, 5, 2),
         {"filterpy": 180, "Stone Soup": 90},
@@ -152,7 +152,7 @@ PROBLEMS = {
         MODELS,
     ),
     "images": Problem(
-        "radar images of pogorelsky2020, 9 error states: 10 Runge-Kutta steps of 0.83 s with "
+        "radar images of Pogorelsky et al., 9 error states: 10 Runge-Kutta steps of 0.83 s with "
         "their Jacobians, then 4 measurements",
         ("MEKF",),
         (90, 90, 5, 2),

@@ -185,3 +185,13 @@ def test_the_stored_result_is_whole():
                     continue
                 bounds = DYNAMAX if who == "dynamax" else APART
                 assert result["apart"] < bounds[name]
+
+
+def test_the_stored_growth_is_whole_and_its_memory_that_of_what_comes_back():
+    """At most 200 bytes a member, of which 104 are the start, the state and its innovation."""
+    stored = json.loads((BENCHMARKS / "growth.json").read_text())
+    assert list(stored["members"]) == [str(10**k) for k in range(7)]
+    assert list(stored["steps"]) == [str(10**k) for k in range(5)]
+    assert "1" in stored["processes"]
+    assert stored["members"]["1000000"]["mb"] < 200
+    assert max(found["mb"] for found in stored["steps"].values()) < 20
