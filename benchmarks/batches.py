@@ -4,7 +4,8 @@ Both do the same runs with the same random numbers, on one core, in turns. The l
 of the runs, since each costs the same. Results are medians over the turns.
 
 The second part makes linear updates of two measurements for states of several sizes. The third
-splits the cost of a compiled series of one member into that of the call and that of an update.
+splits the cost of a compiled series of one member into that of the call and that of an update, and
+the fourth times the arctangent that an update cannot do without.
 """
 
 import json
@@ -112,6 +113,32 @@ def split(problem: problems.Coasting | problems.Images) -> dict[str, dict[str, f
     return spent
 
 
+TIMES = 2000
+
+
+def arctangent() -> dict[str, float]:
+    """Nanoseconds of one in a block, compiled by JAX and by NumPy: an EKF needs it at least."""
+    y, x = np.random.default_rng(0).uniform(50.0, 150.0, (2, 512))
+
+    def one(angle: jax.Array, _: None) -> tuple[jax.Array, None]:
+        return 1e-9 * jax.numpy.arctan2(y + angle, x), None
+
+    go = jax.jit(lambda angle: jax.lax.scan(one, angle, None, length=TIMES)[0])
+    contenders = {
+        "navfilters, JAX": lambda: go(x).block_until_ready(),
+        "navfilters, NumPy": lambda: [np.arctan2(y, x) for _ in range(TIMES)],
+    }
+    found = {}
+    for who, run in contenders.items():
+        spent = []
+        for _ in range(REPEATS + 1):  # the first compiles
+            start = time.process_time()
+            run()
+            spent.append((time.process_time() - start) / (TIMES * len(x)) * 1e9)
+        found[who] = round(median(spent[1:]), 1)
+    return found
+
+
 def main() -> None:
     """Measure, print and write ``batches.json``."""
     jax.config.update("jax_enable_x64", True)
@@ -121,6 +148,8 @@ def main() -> None:
         for name, make in (("orbit EKF", problems.coasting), ("MEKF", problems.images))
     }
     sys.stdout.write(f"one member, compiled: {result['calls']}\n")
+    result["arctangent"] = arctangent()
+    sys.stdout.write(f"ns of an arctangent: {result['arctangent']}\n")
     for name, contest in CONTESTS.items():
         found = result["results"][name] = compare(*contest)
         sys.stdout.write(

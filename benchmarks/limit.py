@@ -1,4 +1,4 @@
-"""The practical limit: limit*.c, compiled with -O3 and called through ctypes."""
+"""The practical limit: limit*.c and vectorised.c, compiled and called through ctypes."""
 
 import ctypes
 import shutil
@@ -14,7 +14,9 @@ from navfilters import Gaussian
 from navfilters.space.gravity import Gravity
 
 SOURCES = sorted(Path(__file__).parent.glob("limit*.c"))
+VECTORISED = Path(__file__).with_name("vectorised.c")
 FLAGS = ("-O3", "-shared", "-fPIC")
+WIDE = ("-march=native", "-ffast-math", "-fopenmp-simd")
 
 
 class Flight(ctypes.Structure):
@@ -47,18 +49,25 @@ def compiled(folder: Path) -> dict[str, Callable[..., Gaussian]]:
     dict
         (prior, z, model, steps) -> Gaussian, for mean (members, n) and cov (members, n, n) or
         (n, n). "EKF" and "UKF": n = 2, z (2,), and the model is R (2, 2). "orbit EKF" and "MEKF": n
-        = 6 and 9, the model is ``Coasting`` or ``Images``, and z as the problem has it.
+        = 6 and 9, the model is ``Coasting`` or ``Images``, and z as the problem has it. "EKF,
+        vectorised" and "UKF, vectorised" are as "EKF" and "UKF".
     """
-    library = Path(folder) / "limit.so"
-    command = [compiler() or "cc", *FLAGS, *map(str, SOURCES), "-o", str(library), "-lm"]
-    subprocess.run(command, check=True)
-    loaded = ctypes.CDLL(str(library))
+    loaded = _library(Path(folder) / "limit.so", FLAGS, SOURCES)
+    wide = _library(Path(folder) / "vectorised.so", FLAGS + WIDE, [VECTORISED])
     return {
         "EKF": partial(_static, loaded.ekf),
         "UKF": partial(_static, loaded.ukf),
+        "EKF, vectorised": partial(_static, wide.ekf),
+        "UKF, vectorised": partial(_static, wide.ukf),
         "orbit EKF": partial(_orbit, loaded.orbit_ekf),
         "MEKF": partial(_images, loaded.mekf),
     }
+
+
+def _library(path: Path, flags: tuple[str, ...], sources: list[Path]) -> ctypes.CDLL:
+    command = [compiler() or "cc", *flags, *map(str, sources), "-o", str(path), "-lm"]
+    subprocess.run(command, check=True)
+    return ctypes.CDLL(str(path))
 
 
 def _static(function: Callable, prior: Gaussian, z, R, steps: int) -> Gaussian:

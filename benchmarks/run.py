@@ -57,7 +57,7 @@ class Problem(NamedTuple):
     arguments : callable
         members -> (prior, z, model), what all are given.
     contenders : callable
-        (filter, C's function) -> functions that prepare, by the name in the result.
+        (filter, C's functions by name) -> functions that prepare, by the name in the result.
     distance : callable
         (got, wanted), two Gaussians -> how far the means are apart, (members,).
     apart : str
@@ -71,7 +71,7 @@ class Problem(NamedTuple):
     steps: tuple[int, ...]
     few: dict[str, int]
     arguments: Callable[[int], tuple[Gaussian, np.ndarray, Any]]
-    contenders: Callable[[str, Callable], dict[str, Callable]]
+    contenders: Callable[[str, dict[str, Callable]], dict[str, Callable]]
     distance: Callable[[Gaussian, Gaussian], np.ndarray]
     apart: str
     note: str
@@ -85,10 +85,11 @@ def static(members: int) -> tuple[Gaussian, np.ndarray, np.ndarray]:
     return Gaussian(mean, cov), np.array(setup.z), np.array(setup.model.R)
 
 
-def at_rest(name: str, c: Callable) -> dict[str, Callable]:
+def at_rest(name: str, c: dict[str, Callable]) -> dict[str, Callable]:
     """Who takes part in the static problem."""
     return {
-        "C": peers.limit(c),
+        "C": peers.limit(c[name]),
+        "C, vectorised": peers.limit(c[f"{name}, vectorised"]),
         "navfilters, JAX": peers.ours(name, "jax"),
         "navfilters, NumPy": peers.ours(name, "numpy"),
         "dynamax": peers.dynamax(name),
@@ -103,10 +104,10 @@ def moving(make: Callable) -> Callable:
     return lambda members: (problems.priors(problem, members), problem.z, problem)
 
 
-def in_motion(name: str, c: Callable) -> dict[str, Callable]:
+def in_motion(name: str, c: dict[str, Callable]) -> dict[str, Callable]:
     """Who takes part in a problem in motion."""
     return {
-        "C": peers.limit(c),
+        "C": peers.limit(c[name]),
         "navfilters, JAX": peers_moving.ours("jax"),
         "navfilters, NumPy": peers_moving.ours("numpy"),
         "dynamax": peers_moving.dynamax,
@@ -168,7 +169,7 @@ PROBLEMS = {
 
 
 def compare(
-    problem: Problem, name: str, c: Callable, members: int, repeats: int
+    problem: Problem, name: str, limits: dict[str, Callable], members: int, repeats: int
 ) -> dict[str, dict[str, float]]:
     """Times of all contenders for one filter and batch size.
 
@@ -181,13 +182,13 @@ def compare(
     prior, z, model = problem.arguments(members)
     planned = problem.steps[BATCHES.index(members)]
     go, updates, apart = {}, {}, {}
-    for who, prepare in problem.contenders(name, c).items():
+    for who, prepare in problem.contenders(name, limits).items():
         few = problem.few.get(who, members * planned)
         steps = min(planned, few)
         some = min(members, max(1, few // steps))
         mine = first(prior, some), z, model, steps
         go[who], updates[who] = prepare(*mine), some * steps
-        got, wanted = Gaussian(*go[who]()), c(*mine)  # the first call compiles
+        got, wanted = Gaussian(*go[who]()), limits[name](*mine)  # the first call compiles
         apart[who] = np.max(problem.distance(got, wanted))
     times: dict[str, list[float]] = {who: [] for who in go}
     for _ in range(repeats):
@@ -225,6 +226,7 @@ def machine() -> dict[str, str]:
         "system": platform.system(),
         "python": platform.python_version(),
         "compiler": f"{c.stdout.splitlines()[0]}, {' '.join(limit.FLAGS)}",
+        "vectorised": " ".join(limit.WIDE),
         "device": jax.default_backend(),
     }
 
@@ -260,7 +262,7 @@ def main() -> None:
                 }
                 of_filter = result["results"].setdefault(name, {})
                 for members in chosen.batches:
-                    found = compare(problem, name, limits[name], members, chosen.repeats)
+                    found = compare(problem, name, limits, members, chosen.repeats)
                     of_filter[str(members)] = found
                     show(name, members, found)
     chosen.output.write_text(json.dumps(result, indent=1) + "\n")
