@@ -109,7 +109,8 @@ bench: $(BENCH)/.ready $(VENV)/.book  ## measure beside the peers and a C loop; 
 fuzz: $(VENV)/.test  ## the readers of files under much random damage: ten minutes
 	NAVFILTERS_FUZZ=20000 $(BIN)/pytest tests/test_fuzzing.py -n 2
 
-faults: $(VENV)/.test  ## sweeps and campaigns killed at random instants and resumed: the same bytes?
+faults: $(VENV)/.test  ## full disks, damaged checkpoints, two at once; runs killed at random instants and resumed
+	$(BIN)/pytest tests/runs/test_folder_faults.py tests/runs/test_checkpoints.py
 	nice $(BIN)/python tools/kills.py
 
 shuffled: $(VENV)/.test  ## the quick unit tests in a random order, which is told and can be repeated
