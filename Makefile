@@ -106,7 +106,7 @@ bench: $(BENCH)/.ready $(VENV)/.book  ## measure beside the peers and a C loop; 
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/batches.py
 	env -u OPENBLAS_CORETYPE $(BIN)/python benchmarks/imaging.py
 
-fuzz: $(VENV)/.test  ## the readers of files under much random damage: ten minutes
+fuzz: $(VENV)/.test  ## the readers of files under much random damage: half an hour
 	NAVFILTERS_FUZZ=20000 $(BIN)/pytest tests/test_fuzzing.py -n 2
 
 faults: $(VENV)/.test  ## full disks, damaged checkpoints, two at once; runs killed at random instants and resumed
