@@ -7,7 +7,7 @@ BUILT := _build/.complete
 BENCH := .venv-bench
 TOOLS := _build/dist-tools/bin
 SOURCES := $(shell find book lib -type f -not -path '*/__pycache__/*' -not -name '.*' -not -path '*/thumbnails/*' 2>/dev/null) \
-	_config.yml _toc.yml requirements.txt tools/execute_notebooks.py tools/executed.py tools/thumbnails.py \
+	_config.yml _toc.yml requirements.txt $(wildcard benchmarks/*.json) tools/execute_notebooks.py tools/executed.py tools/thumbnails.py \
 	tools/book_pages.py tools/icons.js tools/search-order.js tools/downloads.py
 
 # Everything runs in .venv, with .venv's settings: what the shell has of packages (ROS sets PYTHONPATH),
@@ -107,10 +107,11 @@ bench: $(BENCH)/.ready $(VENV)/.book  ## measure beside the peers and a C loop; 
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/growth.py
 	env -u OPENBLAS_CORETYPE $(BIN)/python benchmarks/imaging.py
 
-fuzz: $(VENV)/.test  ## the readers of files under much random damage: ten minutes
+fuzz: $(VENV)/.test  ## the readers of files under much random damage: half an hour
 	NAVFILTERS_FUZZ=20000 $(BIN)/pytest tests/test_fuzzing.py -n 2
 
-faults: $(VENV)/.test  ## sweeps and campaigns killed at random instants and resumed: the same bytes?
+faults: $(VENV)/.test  ## full disks, damaged checkpoints, two at once; runs killed at random instants and resumed
+	$(BIN)/pytest tests/runs/test_folder_faults.py tests/runs/test_checkpoints.py
 	nice $(BIN)/python tools/kills.py
 
 shuffled: $(VENV)/.test  ## the quick unit tests in a random order, which is told and can be repeated

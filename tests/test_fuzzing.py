@@ -19,8 +19,10 @@ from palsar_files import IMAGE, LEADER, NAME
 from navfilters.book import claims
 from navfilters.book.claims.statements import load_statements
 from navfilters.diagnosis import LogError, read_log
-from navfilters.sar.ground.terrain import LocalMap
-from navfilters.sar.palsar.geotiff_reader import median_height, read_terrain
+from navfilters.sar.ground.land_cover import LandCover
+from navfilters.sar.ground.scene import Points, Scene
+from navfilters.sar.ground.terrain import LocalMap, Terrain
+from navfilters.sar.palsar.geotiff_reader import median_height, read_reference, read_terrain
 from navfilters.sar.palsar.opening import open_product
 from navfilters.tracking import read_coefficients, read_observations, read_settings
 
@@ -81,6 +83,21 @@ def parquet(path):
     return write_log(log, path).read_bytes()
 
 
+def image_tiff(path):
+    """Backscatter in dB, 24 by 24 pixels of 30 m."""
+    import geotiff_files
+
+    decibels = np.round(geotiff_files.backscatter(size=24))
+    return geotiff_files.image(path, decibels, 30.0, PLACE, compress="deflate").read_bytes()
+
+
+def backscatter_of(path):
+    none = np.zeros(0)
+    flat = Terrain(np.zeros((41, 41)), 29.98, -95.02, 1e-3)
+    scene = Scene(PLACE, flat, LandCover(np.ones((1, 1)), 1.0), Points(none, none, none))
+    read_reference(path, scene, half_width=300.0, pixel=30.0, needed=200.0)
+
+
 def heights_of(path):
     median_height(path, PLACE, 300.0)
     read_terrain(path, PLACE, 300.0)
@@ -111,9 +128,12 @@ READERS = {
     "ledger": ("claims.toml", LEDGER, claims.load, claims.ClaimError),
     "statements": ("statements.toml", STATEMENTS, load_statements, claims.ClaimError),
     "geotiff": ("dem.tif", geotiff, heights_of, (ValueError, OSError)),
+    "reference": ("image.tif", image_tiff, backscatter_of, (ValueError, OSError)),
     "parquet": ("log.parquet", parquet, read_log, LogError),
 }
-NEEDS = {"geotiff": missing("rasterio"), "parquet": missing("pyarrow")}
+NEEDS = {"parquet": missing("pyarrow")} | dict.fromkeys(
+    ("geotiff", "reference"), missing("rasterio")
+)
 
 
 def resident():

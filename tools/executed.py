@@ -14,6 +14,7 @@ KEPT = ROOT / "_build" / "executed"
 SOURCES = (
     "book/**/*.ipynb",
     "book/*.toml",
+    "book/*.json",
     "lib/**/*.py",
     "requirements*.txt",
     "benchmarks/*.json",

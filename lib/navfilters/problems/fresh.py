@@ -12,6 +12,7 @@ from navfilters.problems.later_cures import CURES
 from navfilters.problems.problem import Problem
 from navfilters.problems.reading import best, own
 from navfilters.problems.table import Cell, cells
+from navfilters.runs import stored_arrays
 
 PLAIN = "EKF"
 FRESH = "every_cure_fresh.json"
@@ -108,7 +109,7 @@ def write_fresh(path: Any, rows: Iterable[Fresh]) -> None:
     kept = [
         r._replace(then=short(r.then), again=tuple(map(short, r.again)))._asdict() for r in rows
     ]
-    Path(path).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    stored_arrays.write(Path(path), f"{json.dumps(kept, indent=1)}\n".encode())
 
 
 def read_fresh(path: Any = None) -> list[Fresh]:

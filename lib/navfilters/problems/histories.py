@@ -16,6 +16,7 @@ from navfilters.problems.cures import Cure, UnfitError
 from navfilters.problems.later_cures import CURES
 from navfilters.problems.problem import Problem
 from navfilters.problems.table import FEW
+from navfilters.runs import stored_arrays
 from navfilters.runs.sweeping import sweep
 from navfilters.types import Array
 
@@ -199,7 +200,7 @@ def write(path: Any, courses: Iterable[Course], found: Iterable[History]) -> Non
         f'"{name}": [\n' + ",\n".join(rows) + "\n]"
         for name, rows in zip(_PARTS, (heads, lines), strict=True)
     ]
-    Path(path).write_text(f"{{{', '.join(parts)}}}\n", encoding="utf-8")
+    stored_arrays.write(Path(path), f"{{{', '.join(parts)}}}\n".encode())
 
 
 def _whole(logs: Iterable[float]) -> list[int | None]:

@@ -1,6 +1,7 @@
 """The table at its full size, as it was computed last, beside the library."""
 
 import csv
+import io
 from collections.abc import Iterable
 from dataclasses import asdict, fields
 from importlib.resources import files
@@ -8,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from navfilters.problems.table import Cell
+from navfilters.runs import stored_arrays
 
 FILE = "every_cure.csv"
 RUNS = 200
@@ -15,18 +17,19 @@ RUNS = 200
 
 
 def write(path: Any, found: Iterable[Cell]) -> None:
-    """Store a table, four digits of each number; see ``settled`` for what they are worth.
+    """Store a table, all or none; four digits of each number, see ``settled`` for their worth.
 
     Parameters
     ----------
     path : path
     found : iterable of Cell
     """
-    with Path(path).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(f.name for f in fields(Cell))
-        for cell in found:
-            writer.writerow(_text(v) for v in asdict(cell).values())
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(f.name for f in fields(Cell))
+    for cell in found:
+        writer.writerow(_text(v) for v in asdict(cell).values())
+    stored_arrays.write(Path(path), text.getvalue().encode())
 
 
 def _text(value: Any) -> Any:
