@@ -27,7 +27,7 @@ from navfilters.papers.pogorelsky2020.experiment import (
     Setup,
     of_case,
 )
-from navfilters.papers.pogorelsky2020.final_nees import final_nees, nees_line
+from navfilters.papers.pogorelsky2020.final_nees import final_nees, nees_line, nees_summary
 from navfilters.papers.pogorelsky2020.image_blocks import (
     BlockCurves,
     BlockMatches,
@@ -185,6 +185,7 @@ __all__ = [
     "monte_carlo",
     "monte_carlo_closed",
     "nees_line",
+    "nees_summary",
     "noise",
     "of_case",
     "open_table",

@@ -22,8 +22,26 @@ def final_nees(result: MonteCarlo) -> Array:
     return nees(result.errors[-1], result.covariances[-1])
 
 
+def nees_summary(values: Array, dof: int = 9) -> tuple[float, float, float, float]:
+    """Mean, half its 95 % interval, median, and percent above the bound of one in a hundred.
+
+    Parameters
+    ----------
+    values : array (runs,)
+    dof : int
+        Degrees of freedom of a consistent filter.
+
+    Returns
+    -------
+    tuple of four floats
+    """
+    half = 1.96 * values.std() / np.sqrt(len(values))
+    above = 100 * np.mean(values > stats.chi2.ppf(0.99, dof))
+    return float(values.mean()), float(half), float(np.median(values)), float(above)
+
+
 def nees_line(values: Array, dof: int = 9) -> str:
-    """Mean with half its 95 % interval, median, and the share above the bound of one in a hundred.
+    """The numbers of ``nees_summary`` as a line of text.
 
     Parameters
     ----------
@@ -35,6 +53,5 @@ def nees_line(values: Array, dof: int = 9) -> str:
     -------
     str
     """
-    half = 1.96 * values.std() / np.sqrt(len(values))
-    above = 100 * np.mean(values > stats.chi2.ppf(0.99, dof))
-    return f"{values.mean():5.1f} ± {half:.1f}, median {np.median(values):4.1f}, {above:4.1f} %"
+    mean, half, median, above = nees_summary(values, dof)
+    return f"{mean:5.1f} ± {half:.1f}, median {median:4.1f}, {above:4.1f} %"
