@@ -204,8 +204,8 @@ class Orbit:
         if is_jax(x.__array_namespace__()):
             return self._forwards(x, Q)
         states = self._states(x, self.start)
-        turned = self._to_end(states)
-        W = variations.accumulated(turned, Q)
+        turned, pushes = self._to_end(states), self._pushes(self.start, self.substeps, x)
+        W = sub_steps.noise(self.gravity, states, turned, Q, self.step, pushes)
         return states[-1], np.ascontiguousarray(turned[0].mT), W
 
     def path(self, x: Array, t: Array | None = None) -> Array:

@@ -1,6 +1,7 @@
 """Sub-steps of an orbit by components, for the host: few calls of NumPy, and no copies.
 
-To the last bit what :class:`~navfilters.space.gravity.Gravity` and the Runge-Kutta step give.
+To the last bit what :class:`~navfilters.space.gravity.Gravity` and the Runge-Kutta step give; the
+noise but for rounding.
 """
 
 from functools import lru_cache
@@ -10,8 +11,14 @@ import numpy as np
 from navfilters.numerics.analytic import dot
 from navfilters.space.gravity import Gravity
 from navfilters.space.thrust import along_velocity
-from navfilters.space.variations import middle, third_order
+from navfilters.space.variations import FEW, accumulated, middle, sum_of_few, third_order
 from navfilters.types import Array
+
+LONG = 4 * FEW
+"""Sub-steps from which the noise is summed up from few of them."""
+
+SLOW = 0.3
+"""Radians that the orbit may turn by meanwhile."""
 
 
 def increment(gravity: Gravity, x: Array, h: float, thrust: Array | None = None) -> np.ndarray:
@@ -133,3 +140,40 @@ def transitions(
         A[..., 3:, 3:] = along_velocity(at[fires][..., 3:], thrust[fires])
         out[fires] = third_order(h * A)
     return F
+
+
+def noise(
+    gravity: Gravity, path: Array, turned: Array, Q: Array, h: float, thrust: Array | None
+) -> Array:
+    """The noise of all sub-steps at the end; where the orbit is slow and smooth, of few terms.
+
+    Parameters
+    ----------
+    gravity : Gravity
+    path : array (k + 1, ..., 6)
+        States a step apart: positions, m, and velocities, m/s.
+    turned : array (k + 1, ..., 6, 6)
+        Of :func:`~navfilters.space.variations.all_to_end`, along the path.
+    Q : array (..., 6, 6)
+        Covariance of each sub-step's noise.
+    h : float
+        Length of a step, s.
+    thrust : array (k, ...), optional
+        Acceleration along the velocity, m/s^2.
+
+    Returns
+    -------
+    array (..., 6, 6)
+    """
+    count = len(path) - 1
+    if thrust is not None or count < LONG:
+        return accumulated(turned, Q)
+    at, weights = sum_of_few(count)
+    r = path[at, ..., :3]
+    nearest = np.sqrt(dot(r, r)).min(axis=0)
+    fast = ~(np.sqrt(gravity.mu / nearest**3) * (h * count) < SLOW)
+    W = accumulated(turned[[0, *at]], Q, weights)
+    if fast.any():
+        of_each = np.broadcast_to(Q, np.broadcast_shapes(Q.shape, turned.shape[1:]))
+        W[..., fast, :, :] = accumulated(turned[:, fast], of_each[..., fast, :, :])
+    return W
