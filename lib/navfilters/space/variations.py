@@ -14,7 +14,7 @@ CACHED = 4000
 """Matrices worked on at a time: enough to amortise a call, few enough for the cache."""
 
 FEW = 12
-"""Terms that stand for all of a long sum: over a third of a radian of an orbit, to 1e-14."""
+"""Terms that stand for all of a long series: over a third of a radian of an orbit, to 1e-14."""
 
 
 def rates(G: Array, V: Array | None, M: Array) -> Array:
@@ -198,8 +198,8 @@ def accumulated(turned: np.ndarray, Q: Array, weights: np.ndarray | None = None)
 
 
 @lru_cache(maxsize=16)
-def sum_of_few(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Where to look at a smooth function of 1 to count, and weights whose sum gives its sum.
+def few_of(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where to look at a smooth function of 1 to count, and what its values there say of all.
 
     Parameters
     ----------
@@ -208,15 +208,16 @@ def sum_of_few(count: int) -> tuple[np.ndarray, np.ndarray]:
 
     Returns
     -------
-    tuple of int array (FEW,), array (FEW,)
-        Exact but for rounding of polynomials of a degree below ``FEW``: a Gauss sum's idea, with
-        whole numbers near the extrema of a Chebyshev polynomial.
+    tuple of int array (FEW,), array (FEW,), array (count, FEW)
+        The places, whole numbers near the extrema of a Chebyshev polynomial; the weights of its
+        sum; those of each value. Exact but for rounding of polynomials of a degree below ``FEW``.
     """
     ends = np.cos(np.pi * np.arange(FEW) / (FEW - 1))
     at = np.rint((count + 1) / 2 - (count - 1) / 2 * ends).astype(int)
     s = (2 * np.arange(1, count + 1) - count - 1) / (count - 1)
     values = np.polynomial.chebyshev.chebvander(s, FEW - 1)
-    return at, np.linalg.solve(values[at - 1].T, values.sum(axis=0))
+    of_each = np.linalg.solve(values[at - 1].T, values.T).T
+    return at, np.linalg.solve(values[at - 1].T, values.sum(axis=0)), of_each
 
 
 def middle(x: Array, x_next: Array, h: float) -> Array:
