@@ -126,7 +126,7 @@ class Setup:
         array (..., 2)
         """
         xp = x.__array_namespace__()
-        angle, rate, aside, up = (component(a, i) for a in (x, w) for i in (0, 1))
+        angle, rate, aside, up = component(x, 0), component(x, 1), component(w, 0), component(w, 1)
         pull = (self.gravity + up) * xp.sin(angle) + aside * xp.cos(angle)
         return vector([rate, component(u, 0) - self.damping * rate - pull / self.length])
 
