@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from navfilters.estimators.continuous import ContinuousSystem
-from navfilters.papers.lecture16.pendulum import discretised
+from navfilters.papers.lecture16.sampling import discretised
 
 Q, R = np.array([[0.3]]), np.array([[0.02]])
 

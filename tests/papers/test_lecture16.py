@@ -18,8 +18,14 @@ from navfilters.estimators.continuous import (
     reference_residual,
 )
 from navfilters.numerics.complex_step import complex_step
+from navfilters.papers.lecture16 import (
+    Setup,
+    band_limited_noise,
+    discretised,
+    experiments,
+    sampled,
+)
 from navfilters.papers.lecture16.__main__ import main as command
-from navfilters.papers.lecture16.pendulum import Setup, band_limited_noise, discretised, sampled
 from navfilters.runs import records
 from navfilters.runs.consistency import nees
 
@@ -209,6 +215,17 @@ def test_a_seed_is_an_experiment():
     assert abs(x(5.0) - other(5.0))[0] > 1e-3
     assert y(5.0).shape == (1,)
     assert_allclose(x(0.0), [1.2, 0.0], atol=1e-12)
+
+
+def test_experiments_together_are_those_one_by_one():
+    setups, t = [FAR, replace(FAR, released=0.5), FAR], np.linspace(0, 8, 9)
+    for case, seed, (x, y) in zip(setups, (1, 1, 2), experiments(setups, (1, 1, 2)), strict=True):
+        x_alone, y_alone = case.experiment(seed)
+        assert_allclose(x(t), x_alone(t), rtol=0, atol=1e-8)
+        assert_allclose(y(t), y_alone(t), rtol=0, atol=1e-8)
+        assert_allclose(y(5.0), y_alone(5.0), rtol=0, atol=1e-8)
+    with pytest.raises(ValueError, match="setups must differ in released alone"):
+        experiments([FAR, replace(FAR, drive=0.0)], (1, 2))
 
 
 def test_a_setup_is_frozen():

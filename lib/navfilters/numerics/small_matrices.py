@@ -108,7 +108,7 @@ def matrix(rows: list[list[Array]]) -> Array:
         With the members innermost in memory.
     """
     v = vector([element for row in rows for element in row])
-    return v.__array_namespace__().reshape(v, (*v.shape[:-1], len(rows), len(rows[0])))
+    return v.reshape(*v.shape[:-1], len(rows), len(rows[0]))
 
 
 def cholesky(A: Array) -> Array:

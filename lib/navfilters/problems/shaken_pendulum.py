@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 
 from navfilters.estimators.discrete import DiscreteSystem
-from navfilters.papers.lecture16.pendulum import Setup, discretised
+from navfilters.papers.lecture16.pendulum import Setup
+from navfilters.papers.lecture16.sampling import discretised
 from navfilters.problems.problem import Draw, Problem, streams
 from navfilters.types import Array, Gaussian
 

@@ -156,8 +156,8 @@ class Orbit:
         -------
         array (..., 6)
         """
-        advance = partial(self._advance, self._pushes(self.start, self.substeps, x))
-        return repeat(advance, x, self.substeps, x.__array_namespace__())
+        pushes = self._pushes(self.start, self.substeps, x)
+        return repeat(partial(self._advance, pushes), x, self.substeps, x.__array_namespace__())
 
     def transition(self, x: Array) -> tuple[Array, Array]:
         """The state at the interval's end, and its derivative with respect to x.
@@ -178,7 +178,7 @@ class Orbit:
         if is_jax(x.__array_namespace__()):
             return self._forwards(x)
         states = self._states(x, self.start)
-        return states[-1], np.ascontiguousarray(self._to_end(states)[0].mT)
+        return states[-1], np.ascontiguousarray(self._to_end(states)[0][0].mT)
 
     def propagate(self, x: Array, Q: Array) -> tuple[Array, Array, Array]:
         """The same, and the covariance at the end of a noise that enters after every sub-step.
@@ -204,9 +204,8 @@ class Orbit:
         if is_jax(x.__array_namespace__()):
             return self._forwards(x, Q)
         states = self._states(x, self.start)
-        turned = self._to_end(states)
-        W = variations.accumulated(turned, Q)
-        return states[-1], np.ascontiguousarray(turned[0].mT), W
+        turned, fast = self._to_end(states)
+        return states[-1], np.ascontiguousarray(turned[0].mT), sub_steps.noise(turned, fast, Q)
 
     def path(self, x: Array, t: Array | None = None) -> Array:
         """The states after every sub-step.
@@ -267,20 +266,21 @@ class Orbit:
         return INTEGRATORS[self.integrator](partial(self.derivative, thrust=thrust), x, h)
 
     def _states(self, x: Array, t: Array) -> Array:
-        pushes = self._pushes(t, self.substeps, x)
-        increment = partial(self._increment, pushes)
+        increment = partial(self._increment, self._pushes(t, self.substeps, x))
         longest = int(0.13 / (self.gravity.fastest * self.step))
         return whole_path(increment, x, self.step, self.substeps, longest)
 
-    def _to_end(self, states: Array) -> np.ndarray:
+    def _to_end(self, states: Array) -> tuple[np.ndarray, np.ndarray]:
+        if self.integrator == "rk4" and self._pushes(self.start, self.substeps, states[0]) is None:
+            return sub_steps.smooth_to_end(self.gravity, states, self.step)
+
         def turned(k: int, part: Array) -> np.ndarray:
-            t = self.start + k * self.step
             if self.integrator == "euler":
-                return self.transitions(part, t).mT
-            thrust = self._pushes(t, len(part) - 1, part[0])
+                return self.transitions(part, self.start + k * self.step).mT
+            thrust = self._pushes(self.start + k * self.step, len(part) - 1, part[0])
             return sub_steps.transitions(self.gravity, part, self.step, thrust, turned=True)
 
-        return variations.all_to_end(turned, states, 6)
+        return variations.all_to_end(turned, states, 6), np.ones(states.shape[1:-1], bool)
 
     def _forwards(self, x: Array, Q: Array | None = None) -> tuple[Array, ...]:
         """f(x), F and, given Q, W, for JAX."""

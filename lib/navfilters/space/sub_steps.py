@@ -1,6 +1,7 @@
 """Sub-steps of an orbit by components, for the host: few calls of NumPy, and no copies.
 
-To the last bit what :class:`~navfilters.space.gravity.Gravity` and the Runge-Kutta step give.
+To the last bit what :class:`~navfilters.space.gravity.Gravity` and the Runge-Kutta step give; what
+accumulates over an interval but for rounding.
 """
 
 from functools import lru_cache
@@ -10,8 +11,21 @@ import numpy as np
 from navfilters.numerics.analytic import dot
 from navfilters.space.gravity import Gravity
 from navfilters.space.thrust import along_velocity
-from navfilters.space.variations import middle, third_order
+from navfilters.space.variations import (
+    FEW,
+    accumulated,
+    all_to_end,
+    few_of,
+    middle,
+    third_order,
+)
 from navfilters.types import Array
+
+LONG = 4 * FEW
+"""Sub-steps from which few of them stand for all."""
+
+SLOW = 0.3
+"""Radians that the orbit may turn by meanwhile."""
 
 
 def increment(gravity: Gravity, x: Array, h: float, thrust: Array | None = None) -> np.ndarray:
@@ -133,3 +147,68 @@ def transitions(
         A[..., 3:, 3:] = along_velocity(at[fires][..., 3:], thrust[fires])
         out[fires] = third_order(h * A)
     return F
+
+
+def smooth_to_end(gravity: Gravity, path: Array, h: float) -> tuple[np.ndarray, np.ndarray]:
+    """The derivatives of a coasting path's end; where the orbit is slow, from few transitions.
+
+    Parameters
+    ----------
+    gravity : Gravity
+    path : array (k + 1, ..., 6)
+        States a step apart: positions, m, and velocities, m/s.
+    h : float
+        Length of a step, s.
+
+    Returns
+    -------
+    tuple of array (k + 1, ..., 6, 6), bool array (...)
+        As of :func:`~navfilters.space.variations.all_to_end`, but for rounding; and which members
+        are fast, so that every transition of theirs was computed.
+    """
+
+    def each(k: int, part: Array) -> np.ndarray:
+        return transitions(gravity, part, h, None, turned=True)
+
+    count, batch = len(path) - 1, path.shape[1:-1]
+    if count < LONG:
+        return all_to_end(each, path, 6), np.ones(batch, bool)
+    at, _, of_each = few_of(count)
+    some = np.stack([path[at - 1], path[at]])
+    known = transitions(gravity, some, h, None, turned=True).reshape(FEW, -1)
+
+    def between(k: int, part: Array) -> np.ndarray:
+        steps = len(part) - 1
+        return (of_each[k : k + steps] @ known).reshape(steps, *batch, 6, 6)
+
+    turned = all_to_end(between, path, 6)
+    r = some[1, ..., :3]
+    nearest = np.sqrt(dot(r, r)).real.min(axis=0)
+    fast = ~(np.sqrt(gravity.mu / nearest**3) * (h * count) < SLOW)
+    if fast.any():
+        turned[:, fast] = all_to_end(each, path[:, fast], 6)
+    return turned, fast
+
+
+def noise(turned: Array, fast: Array, Q: Array) -> Array:
+    """The noise of all sub-steps at the end; where the orbit is slow, from few of its terms.
+
+    Parameters
+    ----------
+    turned, fast : array (k + 1, ..., 6, 6), bool array (...)
+        Of :func:`smooth_to_end`.
+    Q : array (..., 6, 6)
+        Covariance of each sub-step's noise.
+
+    Returns
+    -------
+    array (..., 6, 6)
+    """
+    if fast.all():
+        return accumulated(turned, Q)
+    at, weights, _ = few_of(len(turned) - 1)
+    W = accumulated(turned[[0, *at]], Q, weights)
+    if fast.any():
+        of_each = np.broadcast_to(Q, np.broadcast_shapes(Q.shape, turned.shape[1:]))
+        W[..., fast, :, :] = accumulated(turned[:, fast], of_each[..., fast, :, :])
+    return W

@@ -1,6 +1,7 @@
 """How small differences of position and velocity grow in a step: A = [0, I; G, V], written out."""
 
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,9 @@ from navfilters.types import Array
 
 CACHED = 4000
 """Matrices worked on at a time: enough to amortise a call, few enough for the cache."""
+
+FEW = 12
+"""Terms that stand for all of a long series: over a third of a radian of an orbit, to 1e-14."""
 
 
 def rates(G: Array, V: Array | None, M: Array) -> Array:
@@ -162,14 +166,16 @@ def all_to_end(
     return turned
 
 
-def accumulated(turned: np.ndarray, Q: Array) -> Array:
-    """sum_k Phi_k Q Phi_k^T, of a noise that enters after each step.
+def accumulated(turned: np.ndarray, Q: Array, weights: np.ndarray | None = None) -> Array:
+    """sum_k w_k Phi_k Q Phi_k^T, of a noise that enters after each step.
 
     Parameters
     ----------
     turned : array (k + 1, ..., n, n)
         Of :func:`all_to_end`.
     Q : array (..., n, n)
+    weights : array (k,), optional
+        1 by default.
 
     Returns
     -------
@@ -183,9 +189,35 @@ def accumulated(turned: np.ndarray, Q: Array) -> Array:
     W: Any = 0.0
     for first in range(1, len(turned), size):
         some = turned[first : first + size]
-        for term in some.mT @ (Q_turned @ some):
+        right = Q_turned @ some
+        if weights is not None:
+            right *= weights[first - 1 :][: len(some)].reshape(-1, *(1,) * (right.ndim - 1))
+        for term in some.mT @ right:
             W = W + term
     return W.mT
+
+
+@lru_cache(maxsize=16)
+def few_of(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where to look at a smooth function of 1 to count, and what its values there say of all.
+
+    Parameters
+    ----------
+    count : int
+        Several times ``FEW``.
+
+    Returns
+    -------
+    tuple of int array (FEW,), array (FEW,), array (count, FEW)
+        The places, whole numbers near the extrema of a Chebyshev polynomial; the weights of its
+        sum; those of each value. Exact but for rounding of polynomials of a degree below ``FEW``.
+    """
+    ends = np.cos(np.pi * np.arange(FEW) / (FEW - 1))
+    at = np.rint((count + 1) / 2 - (count - 1) / 2 * ends).astype(int)
+    s = (2 * np.arange(1, count + 1) - count - 1) / (count - 1)
+    values = np.polynomial.chebyshev.chebvander(s, FEW - 1)
+    of_each = np.linalg.solve(values[at - 1].T, values.T).T
+    return at, np.linalg.solve(values[at - 1].T, values.sum(axis=0)), of_each
 
 
 def middle(x: Array, x_next: Array, h: float) -> Array:

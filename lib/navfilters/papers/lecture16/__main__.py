@@ -11,7 +11,8 @@ import numpy as np
 from navfilters.estimators.catalogue import FILTERS
 from navfilters.estimators.continuous import extended_kalman_bucy, linearized_kalman_bucy
 from navfilters.numerics.extras import at_least, command
-from navfilters.papers.lecture16.pendulum import Setup, discretised, sampled
+from navfilters.papers.lecture16.pendulum import Setup
+from navfilters.papers.lecture16.sampling import discretised, sampled
 from navfilters.runs.loop import run
 from navfilters.runs.progress import bar
 from navfilters.types import Array

@@ -5,8 +5,9 @@ its angle; the range finder's error is a fraction of the range. Both noises ente
 that depend on the state, L(x) w and M(x) v.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -14,8 +15,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from navfilters.estimators.continuous import ContinuousSystem, Reference, Signal
-from navfilters.estimators.discrete import DiscreteSystem
 from navfilters.numerics.small_matrices import matrix, vector
+from navfilters.papers.lecture16.noise import amplitudes, sum_of_sines
 from navfilters.types import Array, Gaussian
 
 
@@ -125,7 +126,7 @@ class Setup:
         array (..., 2)
         """
         xp = x.__array_namespace__()
-        angle, rate, aside, up = (component(a, i) for a in (x, w) for i in (0, 1))
+        angle, rate, aside, up = component(x, 0), component(x, 1), component(w, 0), component(w, 1)
         pull = (self.gravity + up) * xp.sin(angle) + aside * xp.cos(angle)
         return vector([rate, component(u, 0) - self.damping * rate - pull / self.length])
 
@@ -190,111 +191,82 @@ class Setup:
 
 @lru_cache(maxsize=64)
 def _experiment(setup: Setup, seed: int) -> tuple[Signal, Signal]:
+    w, v = _spectra(setup, seed)
+    x = _motion(setup, setup.released, sum_of_sines(w, setup.duration))
+    return x, _seen(setup, x, v)
+
+
+def experiments(setups: Sequence[Setup], seeds: Sequence[int]) -> list[tuple[Signal, Signal]]:
+    """Several experiments, which the integrator steps through together.
+
+    Parameters
+    ----------
+    setups : sequence of Setup
+        Of one pendulum; the angles of release may differ.
+    seeds : sequence of int
+        One for each.
+
+    Returns
+    -------
+    list of (x, y)
+        As of :meth:`Setup.experiment`, within the integrator's tolerance.
+
+    Raises
+    ------
+    ValueError
+        Set-ups that differ in more than ``released``.
+    """
+    first, *others = setups
+    for other in others:
+        if replace(other, released=first.released) != first:
+            raise ValueError(f"setups must differ in released alone; found {first} and {other}")
+    spectra = [_spectra(setup, seed) for setup, seed in zip(setups, seeds, strict=True)]
+    angles = np.array([setup.released for setup in setups])
+    w = sum_of_sines(np.stack([w for w, _ in spectra]), first.duration)
+    together = _motion(first, angles, w)
+
+    def one(i: int) -> tuple[Signal, Signal]:
+        def x(t: Any) -> Array:
+            return together(t)[..., i, :]
+
+        return x, _seen(first, x, spectra[i][1])
+
+    return [one(i) for i in range(len(spectra))]
+
+
+def _spectra(setup: Setup, seed: int) -> tuple[Array, Array]:
+    """Amplitudes of the pivot's noise and of the range finder's."""
     rng = np.random.default_rng(seed)
-    w = band_limited_noise(rng, np.array(setup.shaking), setup.bandwidth, setup.duration)
-    v = band_limited_noise(rng, np.array([setup.ranging]), setup.bandwidth, setup.duration)
-    x = _motion(setup, setup.released, w)
-    return x, lambda t: setup.h(x(t), v(t), t)
+    roots = np.array(setup.shaking), np.array([setup.ranging])
+    w, v = (amplitudes(rng, root, setup.bandwidth, setup.duration) for root in roots)
+    return w, v
 
 
-def _motion(setup: Setup, angle: float, w: Signal) -> Signal:
-    """The pendulum released at rest, (..., 2) at any times (...) of the experiment."""
+def _seen(setup: Setup, x: Signal, v: Array) -> Signal:
+    """What the range finder says."""
+    noise = sum_of_sines(v, setup.duration)
+    return lambda t: setup.h(x(t), noise(t), t)
+
+
+def _motion(setup: Setup, angle: Any, w: Signal) -> Signal:
+    """Pendulums released at rest, (..., k, 2) at any times (...) of the experiment; or one."""
+    start = np.stack([angle, np.zeros_like(angle)], axis=-1)
 
     def rate(t: float, x: Array) -> Array:
-        return setup.f(x, setup.control(t), w(t), t)
+        return setup.f(x.reshape(start.shape), setup.control(t), w(t), t).ravel()
 
     fine = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-10, "dense_output": True}
-    x = solve_ivp(rate, (0.0, setup.duration), [angle, 0.0], **fine).sol
-    return lambda t: x(t).T
+    x = solve_ivp(rate, (0.0, setup.duration), start.ravel(), **fine).sol
+    ends, last = x.ts[1:].tolist(), len(x.interpolants) - 1
+
+    def at(t: Any) -> Array:
+        if isinstance(t, float):  # to the last bit what x gives, without its sorting
+            return x.interpolants[min(bisect_left(ends, t), last)](t).reshape(start.shape)
+        return x(t).T.reshape(*np.shape(t), *start.shape)
+
+    return at
 
 
 def component(x: Array, i: int) -> Array:
     """x_i over the batch axes; of a single vector a number, which NumPy works with faster."""
     return x[i] if x.ndim == 1 else x[..., i]
-
-
-def band_limited_noise(
-    rng: np.random.Generator, root: Array, bandwidth: float, duration: float
-) -> Callable[[Any], Array]:
-    """Gaussian noise with a flat spectrum up to a frequency, as a sum of sines.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    root : array (w,)
-        Root of the two-sided spectral density, units/sqrt(Hz).
-    bandwidth : float
-        Highest frequency, Hz.
-    duration : float
-        The lowest frequency's period, after which the noise repeats itself, s.
-
-    Returns
-    -------
-    callable
-        t (...) -> (..., w), of variance 2 bandwidth root^2 within half a line of the spectrum.
-    """
-    count = round(bandwidth * duration)
-    rates = 2 * np.pi * (np.arange(count) + 0.5) / duration
-    waves = rng.standard_normal((2 * count, len(root))) * root * np.sqrt(2 / duration)
-
-    def noise(t: Any) -> Array:
-        phase = np.multiply.outer(t, rates)
-        both = np.empty((*phase.shape[:-1], 2 * count))
-        np.cos(phase, out=both[..., :count])
-        np.sin(phase, out=both[..., count:])
-        # A product for each time: its digits do not depend on how many are asked for.
-        return both @ waves if both.ndim == 1 else (both[..., None, :] @ waves)[..., 0, :]
-
-    return noise
-
-
-def discretised(system: ContinuousSystem, dt: float) -> DiscreteSystem:
-    """Euler's rule, x + dt f, with the noise that keeps its effect as dt shrinks.
-
-    F = I + dt A,   L_d = dt L,   Q_d = Q / dt,   R_d = R / dt
-
-    so that L_d Q_d L_d^T = dt L Q L^T; with Q itself the process noise would vanish with dt.
-
-    Parameters
-    ----------
-    system : ContinuousSystem
-    dt : float
-        The step, in the system's unit of time. Step k is at t = k dt.
-
-    Returns
-    -------
-    DiscreteSystem
-        A noise that enters h nonlinearly has no continuous limit; this supposes y = g(x) + M(x) v.
-    """
-    A, L, C, M = (system.jacobian(name) for name in "ALCM")
-
-    def F(x: Array, u: Array, w: Array, k: int) -> Array:
-        rate = A(x, u, w, k * dt)
-        return np.eye(rate.shape[-1]) + dt * rate
-
-    return DiscreteSystem(
-        lambda x, u, w, k: x + dt * system.f(x, u, w, k * dt),
-        lambda x, v, k: system.h(x, v, k * dt),
-        np.asarray(system.Q) / dt,
-        np.asarray(system.R) / dt,
-        F=F,
-        L=lambda x, u, w, k: dt * L(x, u, w, k * dt),
-        H=lambda x, v, k: C(x, v, k * dt),
-        M=lambda x, v, k: M(x, v, k * dt),
-    )
-
-
-def sampled(signal: Callable[[Any], Array], times: Array) -> Array:
-    """A signal at several times.
-
-    Parameters
-    ----------
-    signal : callable
-        Times (k,) -> (k, m).
-    times : array (K,)
-
-    Returns
-    -------
-    array (K, m)
-    """
-    return signal(times)
