@@ -114,12 +114,14 @@ class Scene:
         flight, away = view.axes
         height = np.empty((len(along), len(across)), np.float32)
         cover = np.empty_like(height)
+        hidden = np.empty(height.shape, bool)
 
         def look_up(rows: slice) -> None:
             east = along[rows, None] * flight[0] + across * away[0]
             north = along[rows, None] * flight[1] + across * away[1]
             height[rows] = self.height(east, north)
             cover[rows] = self.cover.at(east, north)
+            hidden[rows] = self._hidden(view, across, height[rows])
 
         in_threads(look_up, blocks(len(along), ROWS))
         if np.isnan(height).any():
@@ -134,7 +136,6 @@ class Scene:
         stretch = np.sqrt(1 + rise * rise + slope * slope)
         cosine = (slope * np.sin(ray) + np.cos(ray)) / stretch
         power = cover * lambert(cosine) * stretch * (steps[0] * steps[1])
-        hidden = self._hidden(view, across, height)
         return np.where(hidden, 0, power).astype(np.float32), height
 
     def _rays(self, view: View, across: Array) -> Array:
