@@ -9,7 +9,7 @@ from scipy import fft
 from scipy.interpolate import CubicSpline
 
 from navfilters.sar.in_parts import blocks as parts
-from navfilters.sar.raw.echoes_of_points import Echoes, _history, _unit
+from navfilters.sar.raw.echoes_of_points import Echoes, _history, _turned, _unit
 from navfilters.sar.raw.flight import Flight
 from navfilters.sar.raw.radar import LIGHT, Radar, Window
 from navfilters.types import Array
@@ -100,8 +100,8 @@ class _Bright(NamedTuple):
         carrier = echoes.amplitude * np.exp(-4j * np.pi / radar.wavelength * echoes.slant_range)
         phase = np.outer(change.by_range, echoes.slant_range - R_b) - np.outer(f, time)
         phase += np.outer(change.by_height, echoes.height - mean_height)
-        in_time = (np.exp(1j * phase) * carrier).astype(np.complex64)
-        return cls(in_time, np.exp(-1j * np.outer(delay, f_R)).astype(np.complex64))
+        in_time = (_turned(phase) * carrier).astype(np.complex64)
+        return cls(in_time, _turned(-np.outer(delay, f_R)).astype(np.complex64))
 
     def add(self, rows: slice, out: Array) -> None:
         here = self.in_time[rows]
