@@ -110,11 +110,12 @@ def synthesize(
         if raster is not None and layers is not None:
             inside = np.arange(max(low, raster.cell), min(high, raster.cell + layers.shape[1]))
             offset = window.near_range + inside * dR - R_b
-            ground.append(_Ground(layers[:, inside - raster.cell], change, offset, inside % m))
+            mine = slice(max(low - raster.cell, 0), max(high - raster.cell, 0))
+            ground.append(_Ground(layers[:, mine], change, offset, inside % m))
         if echoes is not None:
             cell = (echoes.slant_range - window.near_range) / dR
-            mine = Echoes(*(a[(cell >= low) & (cell < high)] for a in echoes))
-            bright.append(_Bright.of(radar, change, window, mine, f, f_R, R_b, mean_height))
+            seen = Echoes(*(a[(cell >= low) & (cell < high)] for a in echoes))
+            bright.append(_Bright.of(radar, change, window, seen, f, f_R, R_b, mean_height))
     pulse, in_range = _pulse_spectrum(radar, m), np.empty((n, window.ranges), np.complex64)
 
     def add_up(rows: slice) -> None:
