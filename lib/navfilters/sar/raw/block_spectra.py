@@ -15,7 +15,7 @@ from navfilters.sar.raw.radar import LIGHT, Radar, Window
 from navfilters.types import Array
 
 ROWS = 64  # of a matrix that are transformed at once, 1 MB
-PRODUCT = 2**16  # multiplications in a matrix product: so few that BLAS starts no threads
+PRODUCT = 2**15  # multiplications in a complex matrix product: so few that BLAS starts no threads
 CHANGE = 1.2  # of the migration's phase from the middle of some columns to their end, rad, at most
 NODES = 9  # of those columns that are transformed; 1e-7 between them, for that change
 
@@ -105,7 +105,7 @@ class _Bright(NamedTuple):
 
     def add(self, rows: slice, out: Array) -> None:
         here = self.in_time[rows]
-        for columns in parts(out.shape[1], PRODUCT // (here.size + 1) + 1):
+        for columns in parts(out.shape[1], max(PRODUCT // max(here.size, 1), 1)):
             out[:, columns] += here @ self.in_range[:, columns]
 
 

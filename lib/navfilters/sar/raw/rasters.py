@@ -14,8 +14,8 @@ from navfilters.sar.raw.synthesis import Raster
 from navfilters.space.frames import geodetic_to_ecef
 from navfilters.types import Array
 
-FACETS = 32
-"""Lines of facets that are brought to the radar at once: a few MB."""
+FACETS = 16
+"""Lines of facets that are brought to the radar at once: so few that BLAS starts no threads."""
 
 
 def scene_raster(
