@@ -16,6 +16,7 @@ from navfilters.papers.pogorelsky2020.imaging import Imaging
 from navfilters.papers.pogorelsky2020.noise_draws import noise
 from navfilters.papers.pogorelsky2020.open_loop import monte_carlo
 from navfilters.papers.pogorelsky2020.true_flight import truth
+from navfilters.sar.images.autofocusing import sharpness
 from navfilters.sar.matching.matcher import Matcher
 from navfilters.space.image_measurement import Measurement
 from navfilters.space.navigation_state import NavigationState
@@ -65,6 +66,15 @@ def test_table_agrees_with_a_run_formed_directly():
     assert_allclose(found.speed, climb.speed)
     assert np.linalg.norm(found.r_f[0] - match.r_f) < 3.0
     assert np.linalg.norm(match.r_f - table.truth) < 6.0
+
+
+@pytest.mark.parametrize("off", [-41.0, 0.0, 20.0])
+def test_climbs_see_the_sharpness_of_the_whole_image(off):
+    acquired = acquire(Setup(), 1, SMALL)
+    V = acquired.effective(acquired.speed + off)
+    images = [f.image(V, acquired.slope) for f in (acquired.climber, acquired.focuser)]
+    mine, whole = (sharpness(np.abs(image.pixels) ** 2) for image in images)
+    assert_allclose(mine, whole, rtol=1e-5)
 
 
 def test_a_climb_that_leaves_the_table_is_no_measurement():

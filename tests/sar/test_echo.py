@@ -184,7 +184,7 @@ def test_facets_are_where_they_are(flight, scene):
     along, across = np.linspace(-3400, 3400, 7), np.linspace(-4800, 4800, 9)
     east, north = _lattice(view, along, across)
     height = scene.height(east, north)
-    got = _to_radar(flight, scene, view, along, across, height)
+    got = _to_radar(flight, scene, view, along, across, height)(slice(None))
     exact = flight.closest(geodetic_to_ecef(*scene.map.geodetic(east, north), height))
     assert_allclose(got[0], exact[0], atol=1e-3 / PALSAR.prf)
     assert_allclose(got[1], exact[1], atol=1e-3 * PALSAR.range_spacing)

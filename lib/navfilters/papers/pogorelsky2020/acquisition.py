@@ -130,7 +130,7 @@ def measure_directly(
     """
     limits = (acquired.speed - imaging.reach, acquired.speed + imaging.reach)
     climb = autofocus(
-        acquired.focuser,
+        acquired.climber,
         start,
         acquired.effective,
         steps=imaging.steps,

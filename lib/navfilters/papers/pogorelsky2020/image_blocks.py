@@ -157,7 +157,9 @@ class BlockPlace:
         for _ in range(20):  # converges where no slope is laid over
             r_f = flight.ground_point(t, block.centre_range, height)
             place = acquired.scene.map.position(*ecef_to_geodetic(r_f)[:2])
-            height = float(acquired.scene.height(*place))
+            last, height = height, float(acquired.scene.height(*place))
+            if height == last:
+                break
         r, v = flight.position(t), flight.velocity(t)
         a = acquired.acceleration(np.concatenate([r, v]))
         speed = float(effective_velocity(r, v, r_f, a) ** 2 / np.linalg.norm(v))

@@ -128,7 +128,7 @@ def image_table(
     sharp = np.empty(len(speed))
     for i in progress(range(len(speed))):
         velocity = acquired.effective(float(speed[i]))
-        pixels = acquired.focuser.image(velocity, acquired.slope).pixels
+        pixels = acquired.climber.image(velocity, acquired.slope).pixels
         sharp[i] = sharpness(pixels.real**2 + pixels.imag**2)
     effective = acquired.effective(true)
     derivative = (acquired.effective(true + 1) - acquired.effective(true - 1)) / 2

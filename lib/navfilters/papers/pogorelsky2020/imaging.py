@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -161,6 +162,11 @@ class Acquisition:
             incidence=view_of(flight, r_f).incidence,
             ground_speed=float(effective_velocity(r, v, r_f, a) ** 2 / np.linalg.norm(v)),
         )
+
+    @cached_property
+    def climber(self) -> Focuser:
+        """The focuser without ranges from which no whole pulse came back: to climb on."""
+        return self.focuser.patch(self.focuser.samples, self.effective(self.speed))
 
     @property
     def speed(self) -> float:

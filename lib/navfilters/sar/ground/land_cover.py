@@ -26,20 +26,21 @@ def smooth_field(shape: tuple[int, int], correlation: float, rng: np.random.Gene
     ndarray of float32
         Mean 0 and variance 1 over the ensemble.
     """
-    white = rng.standard_normal(shape, dtype=np.float32)
-    spectrum = fft.rfft2(white, workers=2)
-    spectrum *= _smoothing(tuple(shape), correlation)
-    return fft.irfft2(spectrum, s=shape, workers=2, overwrite_x=True)
+    rows, columns = (_smoothing(n, correlation) for n in shape)
+    low = np.flatnonzero(columns[: shape[1] // 2 + 1])  # beyond is nothing to transform
+    spectrum = fft.rfft(rng.standard_normal(shape, dtype=np.float32), axis=1)[:, low]
+    spectrum *= columns[low]
+    spectrum = fft.fft(spectrum, axis=0, overwrite_x=True)
+    spectrum *= rows[:, None]
+    spectrum = fft.ifft(spectrum, axis=0, overwrite_x=True)
+    return fft.irfft(spectrum, shape[1], axis=1)
 
 
 @lru_cache(maxsize=8)
-def _smoothing(shape: tuple[int, int], correlation: float) -> Array:
-    """Gaussian in frequency, scaled so that the variance stays 1."""
-    f = [fft.fftfreq(shape[0])[:, None], fft.rfftfreq(shape[1])[None, :]]
-    kernel = np.exp(-2 * (np.pi * correlation) ** 2 * (f[0] ** 2 + f[1] ** 2)).astype(np.float32)
-    both = np.concatenate([kernel, kernel[:, 1 : shape[1] - kernel.shape[1] + 1]], axis=1)
-    power = np.sqrt(np.mean(both**2))
-    return kernel / power
+def _smoothing(n: int, correlation: float) -> Array:
+    """Gaussian in frequency, scaled so that the variance stays 1; zero where it would not count."""
+    kernel = np.exp(-2 * (np.pi * correlation * fft.fftfreq(n)) ** 2)
+    return np.where(kernel > 1e-9, kernel / np.sqrt(np.mean(kernel**2)), 0).astype(np.float32)
 
 
 class CoverClass(NamedTuple):

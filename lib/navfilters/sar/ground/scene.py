@@ -114,12 +114,14 @@ class Scene:
         flight, away = view.axes
         height = np.empty((len(along), len(across)), np.float32)
         cover = np.empty_like(height)
+        hidden = np.empty(height.shape, bool)
 
         def look_up(rows: slice) -> None:
             east = along[rows, None] * flight[0] + across * away[0]
             north = along[rows, None] * flight[1] + across * away[1]
             height[rows] = self.height(east, north)
             cover[rows] = self.cover.at(east, north)
+            hidden[rows] = self._hidden(view, across, height[rows])
 
         in_threads(look_up, blocks(len(along), ROWS))
         if np.isnan(height).any():
@@ -128,14 +130,20 @@ class Scene:
                 f"{along[0]:.0f} to {along[-1]:.0f} m and {across[0]:.0f} to {across[-1]:.0f} m"
             )
         steps = along[1] - along[0], across[1] - across[0]
-        rise, slope = np.gradient(height, *steps)
-        ray = self._rays(view, across)
-        # n = (-rise, -slope, 1): its length is also the area on the slope of one on the level
-        stretch = np.sqrt(1 + rise * rise + slope * slope)
-        cosine = (slope * np.sin(ray) + np.cos(ray)) / stretch
-        power = cover * lambert(cosine) * stretch * (steps[0] * steps[1])
-        hidden = self._hidden(view, across, height)
-        return np.where(hidden, 0, power).astype(np.float32), height
+        ray, power = self._rays(view, across), np.empty_like(height)
+
+        def weigh(rows: slice) -> None:
+            first = max(rows.start - 1, 0)  # differences along the flight need the neighbours
+            both: Any = np.gradient(height[first : rows.stop + 1], *steps)
+            rise, slope = (g[rows.start - first : rows.stop - first] for g in both)
+            # n = (-rise, -slope, 1): its length is also the area on the slope of one on the level
+            stretch = np.sqrt(1 + rise * rise + slope * slope)
+            cosine = (slope * np.sin(ray) + np.cos(ray)) / stretch
+            sent = cover[rows] * lambert(cosine) * stretch * (steps[0] * steps[1])
+            power[rows] = np.where(hidden[rows], 0, sent)
+
+        in_threads(weigh, blocks(len(along), ROWS))
+        return power, height
 
     def _rays(self, view: View, across: Array) -> Array:
         """Incidence on the level at each distance across the flight."""

@@ -88,7 +88,8 @@ class LocalMap:
 
 def _turns(longitude: Any, near: float) -> Any:
     """The whole turns, deg, by which longitudes are farther than half a turn from another."""
-    return 360.0 * np.round((np.asarray(longitude) - near) / 360.0)
+    away = np.asarray(longitude) - near
+    return 0.0 if np.all(np.abs(away) < 180.0) else 360.0 * np.round(away / 360.0)
 
 
 @dataclass(frozen=True, eq=False)

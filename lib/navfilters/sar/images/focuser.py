@@ -123,6 +123,11 @@ class Focuser:
         return c / (2 * self._sampling)
 
     @property
+    def samples(self) -> int:
+        """Of an image, in range."""
+        return self._samples
+
+    @property
     def wavelength(self) -> float:
         """Of the carrier, m."""
         return self._wavelength
@@ -224,6 +229,8 @@ class Focuser:
         ValueError
             Naming the argument, the value found and what is needed.
         """
+        if samples == self._samples and fast_length(samples + 2 * GUARD) >= len(self._f_R):
+            return self  # there is nothing to cut
         most = min(self._samples, len(self._f_R) - 2 * GUARD)
         if validation.whole_number("samples", samples, 2) > most:
             raise ValueError(f"samples must be at most {most} for these data; found {samples}")

@@ -1,6 +1,7 @@
 """A reference image of the terrain, with positions."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,13 +27,6 @@ class Reference:
     view : View or None
         From where the reference was taken; None for an orthoimage, in which no terrain leans.
     matcher : Matcher
-
-    Attributes
-    ----------
-    features : Features
-        Of the image.
-    on_terrain : array (n, 3)
-        Where these features are in truth: column and row of a map, and height above the middle, m.
     """
 
     values: Array
@@ -40,16 +34,24 @@ class Reference:
     scene: Scene
     view: View | None
     matcher: Matcher = MATCHER
-    features: Features = field(init=False, repr=False)
-    on_terrain: Array = field(init=False, repr=False)
     _level: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_level", self.scene.height(0.0, 0.0))
-        features = self.matcher.features(self.values)
-        x, y, height = self._terrain(*features.places.T)
-        object.__setattr__(self, "features", features)
-        object.__setattr__(self, "on_terrain", np.stack([*self._place(x, y), height], axis=1))
+
+    @cached_property
+    def features(self) -> Features:
+        """Of the image."""
+        return self.matcher.features(self.values)
+
+    @cached_property
+    def on_terrain(self) -> Array:
+        """Where these features are in truth, (n, 3).
+
+        Column and row of a map, and height above the middle, m.
+        """
+        x, y, height = self._terrain(*self.features.places.T)
+        return np.stack([*self._place(x, y), height], axis=1)
 
     def ground(self, column: Any, row: Any) -> tuple[Array, Array, Array]:
         """Latitude, longitude and height of the terrain that a pixel shows.

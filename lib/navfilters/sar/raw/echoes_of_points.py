@@ -57,7 +57,7 @@ def point_echo(
     phase = np.pi * radar.chirp_rate * (into - radar.pulse_length / 2) ** 2
     inside = (into >= 0) & (into < radar.pulse_length)
     carrier = pattern * np.exp(-4j * np.pi * distance / radar.wavelength)
-    return np.where(inside, np.exp(1j * phase), 0) * carrier[:, None]
+    return np.where(inside, _turned(phase), 0) * carrier[:, None]
 
 
 def _history(radar: Radar, flight: Flight, p: Array, t: Array) -> tuple[Array, Array]:
@@ -82,6 +82,14 @@ def _half_aperture(radar: Radar, flight: Flight, window: Window) -> int:
     a = np.stack([q.deriv(2)(t) for q in flight.path], axis=-1)
     turn = (v @ v + (flight.position(t) - p) @ a) / (np.linalg.norm(v) * far)
     return int(np.ceil(np.tan(angle) / turn * radar.prf)) + 2
+
+
+def _turned(phase: Array) -> Array:
+    """exp(i phase): a real sine and cosine cost a fraction of a complex exponential."""
+    z = np.empty(phase.shape, np.complex128)
+    np.cos(phase, out=z.real)
+    np.sin(phase, out=z.imag)
+    return z
 
 
 def _unit(phase: Array) -> Array:

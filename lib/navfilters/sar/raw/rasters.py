@@ -1,16 +1,21 @@
 """A scene as a raster in the radar's coordinates."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.polynomial.polynomial import polyvander
 
 from navfilters.sar.ground.scene import Scene, View
+from navfilters.sar.in_parts import blocks
 from navfilters.sar.raw.flight import Flight, view_of
 from navfilters.sar.raw.radar import Radar, Window
 from navfilters.sar.raw.synthesis import Raster
 from navfilters.space.frames import geodetic_to_ecef
 from navfilters.types import Array
+
+FACETS = 16
+"""Lines of facets that are brought to the radar at once: so few that BLAS starts no threads."""
 
 
 def scene_raster(
@@ -76,23 +81,35 @@ def _facets(
     ends = [(-extent[1] + np.nanmin(relief)) * 1.03, (extent[1] + np.nanmax(relief)) * 1.03]
     across = np.arange(np.floor(ends[0] / step), np.ceil(ends[1] / step) + 1) * step
     power, height = scene.returns(view, along, across)
-    time, distance = _to_radar(flight, scene, view, along, across, height)
-    row = (time - window.first_time) * radar.prf - first
-    column = (distance - window.near_range) / dR + margin
-    total = np.zeros(shape, np.float32)
-    moment = np.zeros(shape, np.float32)
-    inside = (row >= 0) & (row < shape[0] - 1) & (column >= 0) & (column < shape[1] - 1)
-    row, column, power, height = row[inside], column[inside], power[inside], height[inside]
+    to_radar = _to_radar(flight, scene, view, along, across, height)
+    total, moment = np.zeros(shape), np.zeros(shape)
+    for facets in blocks(len(along), FACETS):
+        time, distance = to_radar(facets)
+        row = (time - window.first_time) * radar.prf - first
+        column = (distance - window.near_range) / dR + margin
+        inside = (row >= 0) & (row < shape[0] - 1) & (column >= 0) & (column < shape[1] - 1)
+        _share(total, moment, *(a[inside] for a in (row, column, power[facets], height[facets])))
+    total, moment = total.astype(np.float32), moment.astype(np.float32)
+    mean = scene.height(0.0, 0.0)
+    return total, np.where(total > 0, moment / np.where(total > 0, total, 1), mean), first
+
+
+def _share(
+    total: Array, moment: Array, row: Array, column: Array, power: Array, height: Array
+) -> None:
+    """Add power, and its moment of height, to the four nearest cells of each facet."""
     i, j = row.astype(np.int64), column.astype(np.int64)
+    if not i.size:
+        return
     row, column = row - i, column - j
+    low, shape = int(i.min()), (int(np.ptp(i)) + 2, total.shape[1])
+    lines, first = slice(low, low + shape[0]), (i - low) * shape[1] + j
     for di, in_row in ((0, 1 - row), (1, row)):
         for dj, in_column in ((0, 1 - column), (1, column)):
             share = power * in_row * in_column
-            index = (i + di) * shape[1] + j + dj
             for grid, weights in ((total, share), (moment, share * height)):
-                grid += np.bincount(index, weights, grid.size).reshape(shape).astype(np.float32)
-    mean = scene.height(0.0, 0.0)
-    return total, np.where(total > 0, moment / np.where(total > 0, total, 1), mean), first
+                found = np.bincount(first + di * shape[1] + dj, weights, shape[0] * shape[1])
+                grid[lines] += found.reshape(shape)
 
 
 def _lattice(view: View, along: Array, across: Array) -> tuple[Array, Array]:
@@ -112,8 +129,8 @@ def _ground_speed(flight: Flight, scene: Scene, view: View) -> float:
 
 def _to_radar(
     flight: Flight, scene: Scene, view: View, along: Array, across: Array, height: Array
-) -> tuple[Array, Array]:
-    """Zero-Doppler time and range of facets, by polynomials through exact ones."""
+) -> Callable[[slice], tuple[Array, Array]]:
+    """Zero-Doppler time and range of lines of facets, by polynomials through exact ones."""
     scale = np.abs(along).max(), np.abs(across).max()
     nodes = np.cos(np.pi * (np.arange(6) + 0.5) / 6)
     low, high = float(height.min()) - 1, float(height.max()) + 1
@@ -123,9 +140,16 @@ def _to_radar(
     inverse = np.linalg.inv(polyvander(nodes, 5))
     to_level = np.linalg.inv(polyvander((levels - levels[1]) / 100, 2))
     rows, columns = polyvander(along / scale[0], 5), polyvander(across / scale[1], 5)
-    h, results = (height - np.float32(levels[1])) / np.float32(100), []
-    for exact in flight.closest(p):
-        c = np.einsum("ia,jb,kc,abc->ijk", inverse, inverse, to_level, exact)
-        grids = [rows @ c[..., k] @ columns.T for k in range(3)]
-        results.append(grids[0] + h * (grids[1] + h * grids[2]))
-    return results[0], results[1]
+    fits = [
+        np.einsum("ia,jb,kc,abc->ijk", inverse, inverse, to_level, exact)
+        for exact in flight.closest(p)
+    ]
+
+    def of(facets: slice) -> tuple[Array, Array]:
+        h, results = (height[facets] - np.float32(levels[1])) / np.float32(100), []
+        for c in fits:
+            grids = [rows[facets] @ c[..., k] @ columns.T for k in range(3)]
+            results.append(grids[0] + h * (grids[1] + h * grids[2]))
+        return results[0], results[1]
+
+    return of
