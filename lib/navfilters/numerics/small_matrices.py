@@ -69,11 +69,9 @@ def outer_sum(a: Array, b: Array) -> Array:
     -----
     Up to 2 x 2 written out, as in :func:`matmul`.
     """
-    if max(a.shape[-1], b.shape[-1]) > WRITTEN_OUT:
-        xp = a.__array_namespace__()
-        return xp.moveaxis(a, 0, -1) @ xp.moveaxis(b, 0, -2)
-    terms = [x[..., :, None] * y[..., None, :] for x, y in zip(a, b, strict=True)]
-    return sum(terms[1:], start=terms[0])
+    xp = a.__array_namespace__()
+    A, B = xp.moveaxis(a, 0, -1), xp.moveaxis(b, 0, -2)
+    return written_out(A, B) if max(A.shape[-2], B.shape[-1]) <= WRITTEN_OUT else A @ B
 
 
 def vector(elements: list[Array]) -> Array:
