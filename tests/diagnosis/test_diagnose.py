@@ -81,8 +81,23 @@ def test_too_careful_first_and_too_sure_later():
     assert found.stopped == 1.0
     assert 225 < found.above <= 276
     sides = [f for f in found.findings if "window" in f]
-    assert sides[0].endswith("begins at 1, below it")
-    assert sides[1].endswith(f"too sure, begins at {found.above:g}")
+    assert sides[0].endswith("begins at time 1, below it")
+    assert sides[1].endswith(f"too sure, begins at time {found.above:g}")
+
+
+@pytest.mark.parametrize(
+    ("begin", "step", "said"),
+    [
+        (0.0660264, 0.04, "0.07"),
+        (-1e-9, 0.04, "0"),
+        (1.7e9 + 0.25, 1.0, "1700000000.2"),
+        (1234567.8, 1e3, "1234568"),
+    ],
+)
+def test_a_time_has_as_many_digits_as_a_log_of_its_span_can_tell(begin, step, said):
+    log = kalman_log(3, told_r=4.0, told_q=4.0)
+    found = diagnose(replace(log, time=begin + step * np.arange(len(log.time))), window=25)
+    assert f"begins at time {said}, below it" in next(f for f in found.findings if "window" in f)
 
 
 def test_an_echo_is_found_at_its_lag():

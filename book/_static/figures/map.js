@@ -38,14 +38,19 @@
       const address = URL.createObjectURL(new Blob([kernel.source, `(${work})();`], { type: "text/javascript" }));
       const context = canvas.getContext("2d");
       let worker = null, asked = "", rows = 0, failing = 0;
-      // From dark, where it gains three digits and more, to white, where it gains nothing or is no number.
-      const shade = (v) => { const t = Number.isFinite(v) ? Math.min(1, Math.max(0, (v + 4) / 4)) : 1; return [40 + 215 * t, 60 + 190 * t, 90 + 160 * t ** 2]; };
+      // The shades of the printed maps: light gains six digits, the darkest none; black is worse than the start, vermilion no number.
+      const shades = [[253, 231, 37], [115, 208, 86], [31, 162, 135], [46, 111, 142], [70, 52, 128]];
+      function shade(v) {
+        if (Number.isNaN(v)) return [213, 94, 0];
+        if (v > 0) return [0, 0, 0];
+        const t = (4 * Math.max(0, v + 6)) / 6, at = Math.min(3, Math.floor(t));
+        return shades[at].map((c, i) => c + (t - at) * (shades[at + 1][i] - c));
+      }
       function received({ data: { i, row } }) {
         const pixels = context.createImageData(SIZE, 1);
         row.forEach((v, j) => {
-          const fails = !(v <= -1);
-          failing += fails;
-          pixels.data.set([...(fails ? [255, 214, 90] : shade(v)), 255], 4 * j);
+          failing += !(v <= -1);
+          pixels.data.set([...shade(v), 255], 4 * j);
         });
         context.putImageData(pixels, 0, SIZE - 1 - i);
         rows += 1;
@@ -63,7 +68,7 @@
       }
       let story = "";
       function report() {
-        const share = rows === SIZE ? `On ${(100 * failing / SIZE ** 2).toFixed(0)} % of the starts (light) ${steps} updates do not gain one decimal digit. ` : `Computing: ${Math.round(100 * rows / SIZE)} %. `;
+        const share = rows === SIZE ? `On ${(100 * failing / SIZE ** 2).toFixed(0)} % of the starts (darkest, black and vermilion) ${steps} updates do not gain one decimal digit. ` : `Computing: ${Math.round(100 * rows / SIZE)} %. `;
         says.replaceChildren(share, story);
         Object.assign(host.dataset, { rows, failing: failing / SIZE ** 2 });
       }

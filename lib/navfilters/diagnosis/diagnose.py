@@ -1,5 +1,6 @@
 """Whether the innovations of one run are what the filter says that they are."""
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -213,6 +214,13 @@ def _errors(log: Log, tail: float) -> dict[str, Any]:
     }
 
 
+def moment(time: float, d: Diagnosis) -> str:
+    """A time of the log, to a thousandth of its span: it has no unit, and a window is longer."""
+    span = float(d.time[-1]) - float(d.time[0])
+    digits = max(0, math.ceil(3 - math.log10(span))) if 0 < span < math.inf else 6
+    return f"{round(time, digits) + 0.0:.15g}"
+
+
 def _findings(d: Diagnosis) -> Iterator[str]:
     if d.indefinite:
         yield f"S is not positive definite at {d.indefinite} updates"
@@ -221,9 +229,9 @@ def _findings(d: Diagnosis) -> Iterator[str]:
         yield f"the filter is {way}: NIS {d.ratio:.2f} times what it should be"
     if d.stopped is not None:
         side = "above" if d.stopped == d.above else "below"
-        yield f"the first window outside its band begins at {d.stopped:g}, {side} it"
-        if d.above not in (None, d.stopped):
-            yield f"the first window above its band, too sure, begins at {d.above:g}"
+        yield f"the first window outside its band begins at time {moment(d.stopped, d)}, {side} it"
+        if d.above is not None and d.above != d.stopped:
+            yield f"the first window above its band, too sure, begins at time {moment(d.above, d)}"
     for c in d.channels:
         if c.biased:
             yield f"channel {c.number} is biased by {c.bias:.2f} deviations"

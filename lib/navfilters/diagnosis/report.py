@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from navfilters.diagnosis.diagnose import Diagnosis, diagnose
+from navfilters.diagnosis.diagnose import Diagnosis, diagnose, moment
 from navfilters.diagnosis.log_file import LogError, read_log
 from navfilters.numerics.extras import needed
 
@@ -29,8 +29,9 @@ def text(found: Diagnosis, ignored: Sequence[str] = ()) -> str:
     str
     """
     updates = int(np.isfinite(found.nis).sum())
+    first, last = (moment(found.time[i], found) for i in (0, -1))
     lines = [
-        f"{updates} updates from {found.time[0]:g} to {found.time[-1]:g}",
+        f"{updates} updates from {first} to {last}, in the log's unit of time",
         f"NIS over its degrees of freedom: {found.ratio:.3f} ({found.low:.3f} to {found.high:.3f})",
     ]
     for c in found.channels:
