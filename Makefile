@@ -69,8 +69,9 @@ lint: $(VENV)/.test  ## ruff over code and notebooks, mypy and the layers of imp
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# Two notebooks at a time, so that BLAS has one core each; without AVX-512 it has its threads.
 nbval: $(VENV)/.test  ## run every notebook and compare with its stored outputs
-	PYTHONPATH="$(CURDIR)/tools" $(BIN)/pytest book --nbval --nbval-current-env -n 2 --dist loadscope \
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH="$(CURDIR)/tools" $(BIN)/pytest book --nbval --nbval-current-env -n 2 --dist loadscope \
 		--no-loadscope-reorder -p no:cacheprovider -p longest_first -p keep_executed
 
 elsewhere: $(VENV)/.test  ## the same without AVX-512, and with another BLAS kernel on one thread

@@ -175,11 +175,14 @@ def smooth_to_end(gravity: Gravity, path: Array, h: float) -> tuple[np.ndarray, 
         return all_to_end(each, path, 6), np.ones(batch, bool)
     at, _, of_each = few_of(count)
     some = np.stack([path[at - 1], path[at]])
-    known = transitions(gravity, some, h, None, turned=True).reshape(FEW, -1)
+    known = transitions(gravity, some, h, None, turned=True).reshape(FEW, -1, 36).swapaxes(0, 1)
 
     def between(k: int, part: Array) -> np.ndarray:
         steps = len(part) - 1
-        return (of_each[k : k + steps] @ known).reshape(steps, *batch, 6, 6)
+        out = np.empty((steps, len(known), 36), known.dtype)
+        # A product for each member: so small that BLAS starts no threads.
+        np.matmul(of_each[k : k + steps], known, out=out.swapaxes(0, 1))
+        return out.reshape(steps, *batch, 6, 6)
 
     turned = all_to_end(between, path, 6)
     r = some[1, ..., :3]
