@@ -154,11 +154,8 @@ def smooth_to_end(gravity: Gravity, path: Array, h: float) -> tuple[np.ndarray, 
 
     Parameters
     ----------
-    gravity : Gravity
-    path : array (k + 1, ..., 6)
-        States a step apart: positions, m, and velocities, m/s.
-    h : float
-        Length of a step, s.
+    gravity, path, h : Gravity, array (k + 1, ..., 6), float
+        As of :func:`transitions`: m, m/s and s.
 
     Returns
     -------

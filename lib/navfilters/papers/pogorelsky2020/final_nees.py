@@ -45,9 +45,8 @@ def nees_line(values: Array, dof: int = 9) -> str:
 
     Parameters
     ----------
-    values : array (runs,)
-    dof : int
-        Degrees of freedom of a consistent filter.
+    values, dof : array (runs,), int
+        As of :func:`nees_summary`.
 
     Returns
     -------
