@@ -215,7 +215,19 @@ def _errors(log: Log, tail: float) -> dict[str, Any]:
 
 
 def moment(time: float, d: Diagnosis) -> str:
-    """A time of the log, to a thousandth of its span: it has no unit, and a window is longer."""
+    """A time of the log, to a thousandth of its span: it has no unit, and a window is longer.
+
+    Parameters
+    ----------
+    time : float
+        In the log's unit.
+    d : Diagnosis
+        Of that log.
+
+    Returns
+    -------
+    str
+    """
     span = float(d.time[-1]) - float(d.time[0])
     digits = max(0, math.ceil(3 - math.log10(span))) if 0 < span < math.inf else 6
     return f"{round(time, digits) + 0.0:.15g}"
