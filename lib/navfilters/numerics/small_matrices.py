@@ -139,7 +139,7 @@ def cholesky(A: Array) -> Array:
     zero = 0.0 if alone else a[0][0].__array_namespace__().zeros_like(a[0][0])
     L = [[zero] * n for _ in range(n)]
     for j in range(n):
-        L[j][j] = root(a[j][j] - sum(L[j][k] ** 2 for k in range(j)))
+        L[j][j] = root(a[j][j] - sum(L[j][k] * L[j][k] for k in range(j)))
         for i in range(j + 1, n):
             L[i][j] = (a[i][j] - sum(L[i][k] * L[j][k] for k in range(j))) / L[j][j]
     return np.array(L) if alone else matrix(L)
