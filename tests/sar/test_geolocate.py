@@ -169,6 +169,16 @@ def test_stretched_or_mirrored_fits_are_refused(linear):
     assert inliers >= 30
 
 
+def test_pairs_are_those_of_opencv(acquired, ground):
+    """To the last: its distances and ours are the same numbers."""
+    cv2, matcher = pytest.importorskip("cv2"), Matcher(ratio=0.9)
+    found, known = matcher.features(ground.values), acquired.reference.features
+    two = cv2.BFMatcher(cv2.NORM_L2).knnMatch(found.descriptors, known.descriptors, k=2)
+    good = [(a.queryIdx, a.trainIdx) for a, b in two if a.distance < 0.9 * b.distance]
+    assert len(good) > 20
+    assert_array_equal(np.transpose(matcher.pairs(found, known)), good)
+
+
 def test_too_few_pairs():
     assert Matcher().fit(np.zeros((7, 2)), np.zeros((7, 2))) == (None, 0)
     nothing = Features(np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32))
