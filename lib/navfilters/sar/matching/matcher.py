@@ -19,10 +19,26 @@ class Features(NamedTuple):
     places : array (n, 2) of float32
         Column and row, pixels.
     descriptors : array (n, 128) of float32
+    contrast : array (n,) of float32
+        Threshold up to which each is found.
     """
 
     places: Array
     descriptors: Array
+    contrast: Array
+
+    def above(self, contrast: float) -> "Features":
+        """Those that a higher threshold leaves.
+
+        Parameters
+        ----------
+        contrast : float
+
+        Returns
+        -------
+        Features
+        """
+        return Features(*(a[self.contrast >= np.float32(contrast)] for a in self))
 
 
 @dataclass(frozen=True)
@@ -111,9 +127,10 @@ class Matcher:
         )
         points, descriptors = sift.detectAndCompute(grey.round().astype(np.uint8), None)
         if descriptors is None:
-            return Features(np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32))
+            return Features(*(np.zeros((0, *n), np.float32) for n in ((2,), (128,), ())))
         places = np.array([point.pt for point in points], np.float32)
-        return Features(places, descriptors)
+        contrast = 3 * np.array([point.response for point in points], np.float32)  # of 3 layers
+        return Features(places, descriptors, contrast)
 
     def pairs(self, image: Features, reference: Features) -> tuple[Array, Array]:
         """Features that are more alike than any other two: Lowe's ratio test.
