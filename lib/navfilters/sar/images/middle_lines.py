@@ -13,7 +13,6 @@ from navfilters.types import Array
 FINER = 2.0  # the coarse grid's frequencies lie closer than those of the lines by this
 WIDTH = 8  # of the window, coarse frequencies: for that, as good as single precision
 ROWS = 8  # coarse frequencies in a matrix product: with PIECE, BLAS starts no threads
-COLUMNS = 32  # that are transformed at once
 
 
 class _Gridding(NamedTuple):
@@ -56,17 +55,16 @@ def middle_lines(spectrum: Array, first: int, n: int, lines: int, columns: int) 
     beatty2005: the Kaiser-Bessel window.
     """
     length, rows, parts, left = _gridding(n, len(spectrum), lines)
-    coarse = np.zeros((rows, spectrum.shape[1]), np.complex64)
-
-    def pieces(a: Array) -> Array:
-        return a.view(np.float32).reshape(len(a), -1, 2 * PIECE).swapaxes(0, 1)
+    pieces = spectrum.reshape(len(spectrum), -1, PIECE).swapaxes(0, 1)
+    coarse = np.zeros((len(pieces), rows, PIECE), np.complex64)  # each piece stays in the cache
 
     def gather(some: slice) -> None:
         for here, there, weights in parts[some]:
-            np.matmul(weights, pieces(spectrum[there]), out=pieces(coarse[here]))
+            for_all = pieces[:, there].view(np.float32)
+            np.matmul(weights, for_all, out=coarse[:, here].view(np.float32))
 
     in_threads(gather, blocks(len(parts), 8))
-    coarse[: rows - length] += coarse[length:]
+    coarse[:, : rows - length] += coarse[:, length:]
     before = lines // 2
     s = np.arange(lines) - before
     turned = np.exp(2j * np.pi * s * (first / n - WIDTH / 2 / length))
@@ -74,11 +72,12 @@ def middle_lines(spectrum: Array, first: int, n: int, lines: int, columns: int) 
     found = np.empty((lines, columns), np.complex64)
 
     def transform(some: slice) -> None:
-        column = fft.ifft(coarse[:length, some], axis=0)
-        np.multiply(column[length - before :], scale[:before], out=found[:before, some])
-        np.multiply(column[: lines - before], scale[before:], out=found[before:, some])
+        into = found[:, some]
+        column = fft.ifft(coarse[some.start // PIECE, :length], axis=0)[:, : into.shape[1]]
+        np.multiply(column[length - before :], scale[:before], out=into[:before])
+        np.multiply(column[: lines - before], scale[before:], out=into[before:])
 
-    in_threads(transform, blocks(columns, COLUMNS))
+    in_threads(transform, blocks(columns, PIECE))
     return found
 
 
