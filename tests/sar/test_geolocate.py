@@ -11,7 +11,7 @@ from scipy.ndimage import affine_transform
 from navfilters.papers.pogorelsky2020.acquisition import _locate
 from navfilters.sar.images.ground_image import GroundImage, to_ground
 from navfilters.sar.matching.geolocation import geolocate
-from navfilters.sar.matching.matcher import Features, Matcher
+from navfilters.sar.matching.matcher import Matcher
 from navfilters.sar.matching.reference import form_reference
 from navfilters.space.frames import ecef_to_geodetic
 
@@ -169,9 +169,31 @@ def test_stretched_or_mirrored_fits_are_refused(linear):
     assert inliers >= 30
 
 
+def test_pairs_are_those_of_opencv(acquired, ground):
+    """To the last: its distances and ours are the same numbers."""
+    cv2, matcher = pytest.importorskip("cv2"), Matcher(ratio=0.9)
+    found, known = matcher.features(ground.values), acquired.reference.features
+    two = cv2.BFMatcher(cv2.NORM_L2).knnMatch(found.descriptors, known.descriptors, k=2)
+    good = [(a.queryIdx, a.trainIdx) for a, b in two if a.distance < 0.9 * b.distance]
+    assert len(good) > 20
+    assert_array_equal(np.transpose(matcher.pairs(found, known)), good)
+
+
+@pytest.mark.parametrize("contrast", [0.03, 0.04, 0.1])
+def test_features_of_more_contrast_are_those_of_a_higher_threshold(acquired, contrast):
+    low = replace(acquired.reference, matcher=Matcher(contrast=0.01))
+    again = replace(low, matcher=Matcher(contrast=contrast))
+    kept = low.at_contrast(contrast)
+    assert kept.matcher == again.matcher
+    assert 0 < len(again.features.places) < len(low.features.places)
+    for a, b in zip(kept.features, again.features, strict=True):
+        assert_array_equal(a, b)
+
+
 def test_too_few_pairs():
     assert Matcher().fit(np.zeros((7, 2)), np.zeros((7, 2))) == (None, 0)
-    nothing = Features(np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32))
+    nothing = Matcher().features(np.zeros((30, 30)))
+    assert len(nothing.above(0.1).places) == 0
     assert len(Matcher().pairs(nothing, nothing)[0]) == 0
     point = np.full((40, 2), 3.0)
     assert Matcher().fit(point, point)[0] is None

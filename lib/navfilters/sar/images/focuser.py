@@ -7,6 +7,7 @@ from scipy import fft
 from scipy.constants import c
 
 from navfilters.numerics import validation
+from navfilters.sar.images.middle_lines import middle_lines
 from navfilters.sar.images.raw_data import RawData
 from navfilters.sar.images.slant_image import Image
 from navfilters.sar.in_parts import blocks, in_threads
@@ -174,29 +175,24 @@ class Focuser:
         def change(f: Array, distance: Array) -> Array:
             return compression(f, distance) - compression(f, np.zeros(1))
 
-        in_the_middle = unit(compression(self._f[:, None], np.zeros(1)))
+        middle = (self._first + self._lines // 2) / self._prf
+        in_time = 2 * np.pi * middle * self._f[:, None]
+        in_the_middle = unit(compression(self._f[:, None], np.zeros(1)) + in_time)
         size = -(-self._samples // PIECE) * PIECE
         distance = self.range_spacing * (np.arange(size) - self._samples // 2)
-        filtered = np.empty((len(self._f), self._samples), np.complex64)
+        filtered = np.empty((len(self._f), size), np.complex64)
+        filtered[:, self._samples :] = 0
 
         def fill(lines: slice) -> None:
             data = phasor(change, self._f[lines], distance)[:, : self._samples]
             data *= in_the_middle[lines]
-            np.multiply(
-                data, self._straightened(migration, lines)[:, : self._samples], out=filtered[lines]
-            )
+            straight = self._straightened(migration, lines)[:, : self._samples]
+            np.multiply(data, straight, out=filtered[lines, : self._samples])
 
         most = lines_at_once(self._f, (migration, self._f_R), (change, distance))
         in_threads(fill, blocks(len(self._f), most))
-        pixels = np.empty((self._lines, self._samples), np.complex64)
-
-        def focus(columns: slice) -> None:
-            column = np.zeros((self._n, columns.stop - columns.start), np.complex64)
-            column[self._kept] = filtered[:, columns]
-            focused = fft.ifft(column, axis=0, overwrite_x=True)
-            pixels[:, columns] = focused[self._first : self._first + self._lines]
-
-        in_threads(focus, blocks(self._samples, COLUMNS))
+        first = round(self._f[0] * self._n / self._prf)
+        pixels = middle_lines(filtered, first, self._n, self._lines, self._samples)
         return Image(
             pixels,
             self._first_time + self._first / self._prf,

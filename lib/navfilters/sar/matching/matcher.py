@@ -7,6 +7,7 @@ import numpy as np
 
 from navfilters.numerics import validation
 from navfilters.numerics.extras import needed
+from navfilters.sar.in_parts import blocks
 from navfilters.types import Array
 
 
@@ -18,10 +19,26 @@ class Features(NamedTuple):
     places : array (n, 2) of float32
         Column and row, pixels.
     descriptors : array (n, 128) of float32
+    contrast : array (n,) of float32
+        Threshold up to which each is found.
     """
 
     places: Array
     descriptors: Array
+    contrast: Array
+
+    def above(self, contrast: float) -> "Features":
+        """Those that a higher threshold leaves.
+
+        Parameters
+        ----------
+        contrast : float
+
+        Returns
+        -------
+        Features
+        """
+        return Features(*(a[self.contrast >= np.float32(contrast)] for a in self))
 
 
 @dataclass(frozen=True)
@@ -110,9 +127,10 @@ class Matcher:
         )
         points, descriptors = sift.detectAndCompute(grey.round().astype(np.uint8), None)
         if descriptors is None:
-            return Features(np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32))
+            return Features(*(np.zeros((0, *n), np.float32) for n in ((2,), (128,), ())))
         places = np.array([point.pt for point in points], np.float32)
-        return Features(places, descriptors)
+        contrast = 3 * np.array([point.response for point in points], np.float32)  # of 3 layers
+        return Features(places, descriptors, contrast)
 
     def pairs(self, image: Features, reference: Features) -> tuple[Array, Array]:
         """Features that are more alike than any other two: Lowe's ratio test.
@@ -128,11 +146,9 @@ class Matcher:
         """
         if len(image.places) == 0 or len(reference.places) < 2:
             return np.zeros(0, int), np.zeros(0, int)
-        matcher = _cv2().BFMatcher(_cv2().NORM_L2)
-        two = matcher.knnMatch(image.descriptors, reference.descriptors, k=2)
-        good = [a for a, b in two if a.distance < self.ratio * b.distance]
-        pairs = np.array([(a.queryIdx, a.trainIdx) for a in good], int).reshape(-1, 2)
-        return pairs[:, 0], pairs[:, 1]
+        index, nearest, second = _two_nearest(image.descriptors, reference.descriptors)
+        good = np.flatnonzero(nearest < self.ratio * second)
+        return good, index[good]
 
     def fit(self, start: Array, end: Array) -> tuple[Array | None, int]:
         """The affine transformation between paired places, by RANSAC.
@@ -171,6 +187,35 @@ class Matcher:
 
 
 MATCHER = Matcher()
+
+LINES, PIECE = 64, 32
+"""Features in a product of descriptors: so few that BLAS starts no threads, which would wait."""
+
+
+def _two_nearest(of: Array, among: Array) -> tuple[Array, Array, Array]:
+    """Which descriptor is nearest to each, its distance, and that of the next.
+
+    Distances are exact: SIFT's descriptors are whole numbers, the sums of whose squares single
+    precision holds.
+    """
+    n, m = len(of), -(-len(among) // PIECE) * PIECE
+    padded = np.zeros((m, among.shape[1]), np.float32)
+    padded[: len(among)] = among
+    half = np.full(m, np.inf, np.float32)  # |a - b|^2 / 2 = |a|^2 / 2 + (|b|^2 / 2 - a . b)
+    half[: len(among)] = np.einsum("ij,ij->i", among, among) / 2
+    pieces = padded.reshape(-1, PIECE, padded.shape[1]).mT
+    index, less = np.empty(n, int), np.empty((2, n), np.float32)
+    for lines in blocks(n, LINES):
+        here = of[lines]
+        beyond, row = np.empty((len(here), m), np.float32), np.arange(len(here))
+        np.matmul(here, pieces, out=beyond.reshape(len(here), -1, PIECE).swapaxes(0, 1))
+        np.subtract(half, beyond, out=beyond)
+        index[lines] = first = beyond.argmin(axis=1)
+        less[0, lines] = beyond[row, first]
+        beyond[row, first] = np.inf
+        less[1, lines] = beyond.min(axis=1)
+    distance = np.sqrt(np.einsum("ij,ij->i", of, of) + 2 * less).astype(float)
+    return index, distance[0], distance[1]
 
 
 def _cv2() -> Any:

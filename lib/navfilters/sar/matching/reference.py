@@ -1,6 +1,6 @@
 """A reference image of the terrain, with positions."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -52,6 +52,22 @@ class Reference:
         """
         x, y, height = self._terrain(*self.features.places.T)
         return np.stack([*self._place(x, y), height], axis=1)
+
+    def at_contrast(self, contrast: float) -> "Reference":
+        """The same, matched at a higher threshold, for which no features are looked for again.
+
+        Parameters
+        ----------
+        contrast : float
+            See ``Matcher``.
+
+        Returns
+        -------
+        Reference
+        """
+        other = replace(self, matcher=replace(self.matcher, contrast=contrast))
+        vars(other)["features"] = self.features.above(contrast)  # where it would be kept
+        return other
 
     def ground(self, column: Any, row: Any) -> tuple[Array, Array, Array]:
         """Latitude, longitude and height of the terrain that a pixel shows.
