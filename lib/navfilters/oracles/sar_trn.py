@@ -1,9 +1,10 @@
 """SAR navigation a second time, one run at a time, in other techniques; imports nothing of ours.
 
-Motion is integrated in an inertial frame and turned; the covariance follows expm (Van Loan) of a
-numerically differenced dynamics; measurement Jacobians are fourth-order central differences with
-the misalignment perturbed multiplicatively; attitude is direction cosine matrices; the gain is a
-50-digit inverse of the badly scaled innovation covariance; the ellipsoid is hit by root finding.
+Motion is integrated in an inertial frame and turned; the covariance follows the exponential (Van
+Loan) of a numerically differenced dynamics; measurement Jacobians are fourth-order central
+differences with the misalignment perturbed multiplicatively; attitude is direction cosine matrices;
+the gain is a 50-digit inverse of the badly scaled innovation covariance; the ellipsoid is hit by
+root finding.
 
 SI units, radians. Errors are truth minus estimate: r = r_hat + dr, v = v_hat + dv,
 T_mu = T(dmu) T_mu_hat with the passive T(dmu) = I - [dmu x] + ... . T_ab maps components in frame a
@@ -16,7 +17,6 @@ from decimal import Decimal, localcontext
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 from scipy.spatial.transform import Rotation
 
@@ -182,8 +182,18 @@ def ecef_rate(x):
     return np.concatenate([vi - r @ W.T, gravity(r) - vi @ W.T - v @ W.T], axis=-1)
 
 
+def exponential(A):
+    """By its series, of matrices whose squares are small; SciPy's starts threads, which wait."""
+    total = term = np.eye(A.shape[-1])
+    for k in range(1, 9):
+        term = term @ A / k
+        total = total + term
+    return total
+
+
 def predict(r, v, T_mu, P, dt, substeps=4):
-    """Filter prediction over dt: estimate by `flow`, covariance by expm of differenced dynamics."""
+    """Filter prediction over dt: estimate by `flow`, covariance by the exponential of differenced
+    dynamics."""
     h = dt / substeps
     rs, vs = flow(r, v, np.append((np.arange(substeps) + 0.5) * h, dt))
     Q = np.diag([0.0] * 3 + [Q_VELOCITY] * 3 + [Q_MISALIGNMENT] * 3)
@@ -195,7 +205,7 @@ def predict(r, v, T_mu, P, dt, substeps=4):
     van_loan[:, 9:15, 9:15] = changes.reshape(substeps, 6, 6).swapaxes(1, 2)
     van_loan[:, :6, :6] = -changes.reshape(substeps, 6, 6)
     van_loan[:, :9, 9:] = Q
-    for block in expm(h * van_loan):
+    for block in exponential(h * van_loan):
         F = block[9:, 9:].T
         P = F @ P @ F.T + F @ block[:9, 9:]
         P = (P + P.T) / 2
