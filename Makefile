@@ -38,6 +38,13 @@ define made
 test -z "$(2)" && $(1)/bin/python -c '$(WHOLE)' >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(1)
 endef
 
+# Installs into an environment by uv where there is one, else by the environment's pip.
+UV := $(shell command -v uv >/dev/null && echo uv)
+install = $(if $(UV),uv pip install --python $(1)/bin/python --compile-bytecode,$(1)/bin/python -m pip install \
+	--disable-pip-version-check) --quiet
+locked = $(call install,$(1)) --require-hashes -r $(2)
+ours = $(call install,$(1)) --no-deps --no-build-isolation -e .
+
 .DEFAULT_GOAL := help
 .PHONY: help book test unit coverage lint notebooks nbval elsewhere spread pages screens pdf dist serve bench fuzz faults shuffled mutants campaign lock clean
 
@@ -81,7 +88,7 @@ spread: $(VENV)/.test  ## how far each claim moves with last bits and processors
 	$(BIN)/python tools/spread.py --store
 
 pages: $(VENV)/.test $(BUILT)  ## the ledger, the stored notebooks, and the built pages in a browser
-	$(BIN)/pytest tests/book -n 2 --dist loadgroup -m "not alone"
+	$(BIN)/pytest tests/book -n 3 --dist loadgroup -m "not alone"
 	$(BIN)/pytest tests/book -m alone
 
 notebooks: $(VENV)/.test  ## execute every notebook in place and refresh its stored outputs
@@ -96,7 +103,7 @@ pdf: $(VENV)/.test $(BUILT)  ## the whole book as _build/book.pdf, printed by Ch
 
 dist: $(VENV)/.book  ## wheel and sdist in _build/dist, checked and installed into empty environments
 	test -x $(TOOLS)/twine || $(PYTHON) -m venv --clear _build/dist-tools
-	$(TOOLS)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dist.txt
+	$(call locked,_build/dist-tools,requirements-dist.txt)
 	$(BIN)/python tools/check_package.py $(TOOLS)
 
 serve: $(VENV)/.book  ## the book at http://localhost:8000, built again when a page changes
@@ -126,28 +133,26 @@ campaign: $(VENV)/.book  ## the closed loop at the paper's size; stopped, it goe
 
 lock:  ## refresh the requirements.txt of book, tests, packages and bench from their .in lists
 	test -x $(TOOLS)/uv || $(PYTHON) -m venv --clear _build/dist-tools
-	$(TOOLS)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dist.txt
+	$(call locked,_build/dist-tools,requirements-dist.txt)
 	for list in requirements requirements-test requirements-dist benchmarks/requirements; do \
 		$(TOOLS)/uv pip compile --quiet --upgrade --universal --generate-hashes \
 			--python-version 3.11 $$list.in -o $$list.txt || exit 1; done
 
 $(VENV)/.book: requirements.txt pyproject.toml
 	$(call made,$(VENV),$(MOVED))
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	$(call locked,$(VENV),requirements.txt)
+	$(call ours,$(VENV))
 	$(BIN)/python -c 'import matplotlib.font_manager'  # makes its cache
 	@touch $@
 
 $(VENV)/.test: requirements-test.txt $(VENV)/.book
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-test.txt
+	$(call locked,$(VENV),requirements-test.txt)
 	@touch $@
 
 $(BENCH)/.ready: benchmarks/requirements.txt pyproject.toml
 	$(call made,$(BENCH))
-	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes \
-		-r benchmarks/requirements.txt
-	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
-		--no-build-isolation -e .
+	$(call locked,$(BENCH),benchmarks/requirements.txt)
+	$(call ours,$(BENCH))
 	@touch $@
 
 clean:  ## remove what was built and the virtual environment

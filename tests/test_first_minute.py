@@ -5,6 +5,7 @@ The Makefile runs on copies of the checkout whose tools are stubs, unless a test
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -57,7 +58,7 @@ def checkout(tmp_path, request):
 
 def make(folder, *arguments, **environment):
     done = subprocess.run(
-        ["make", "-C", str(folder), *arguments],
+        ["make", "-C", str(folder), "UV=", *arguments],  # pip, unless a test says otherwise
         capture_output=True,
         text=True,
         env=os.environ | environment,
@@ -114,6 +115,21 @@ def test_an_environment_that_works_is_kept(checkout):
     assert code == 0
     assert made == []
     assert "python -m pip install" in out
+
+
+def test_uv_installs_where_there_is_one(checkout):
+    stub = script(checkout.parent / "bin/uv", '#!/bin/sh\necho "uv $*"\n')
+    os.utime(checkout / "requirements.txt")
+    os.utime(checkout / ".venv/.book", (1, 1))
+    code, out, err = make(checkout, "-s", ".venv/.test", "UV=uv",
+                          PATH=f"{stub.parent}:{os.environ['PATH']}")  # fmt: skip
+    assert code == 0, err
+    assert re.findall("^uv pip install --python .venv/bin/python .*(-r .*|-e .)$", out, re.M) == [
+        "-r requirements.txt",
+        "-e .",
+        "-r requirements-test.txt",
+    ]
+    assert "pip install --disable" not in out
 
 
 @pytest.mark.parametrize("state", ["none", "no pip", "broken pip", "dangling", "not executable"])

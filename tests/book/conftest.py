@@ -5,8 +5,8 @@ from functools import cache
 from pathlib import Path
 
 import browser as chromium
+import lxml.html
 import pytest
-from bs4 import BeautifulSoup
 
 OPEN = """document.querySelectorAll('.bd-article details').forEach(fold => { fold.open = true; })"""
 
@@ -21,8 +21,8 @@ def html():
 
 
 @cache
-def _parsed(path: Path) -> BeautifulSoup:
-    return BeautifulSoup(path.read_text(encoding="utf-8"), "html.parser")
+def _parsed(path: Path) -> lxml.html.HtmlElement:
+    return lxml.html.document_fromstring(path.read_text(encoding="utf-8"))
 
 
 @pytest.fixture(scope="session")
@@ -32,7 +32,7 @@ def document(html):
 
 
 @pytest.fixture(scope="session")
-def documents(html) -> dict[Path, BeautifulSoup]:
+def documents(html) -> dict[Path, lxml.html.HtmlElement]:
     """Every built page, parsed, by its path."""
     paths = [p for p in html.rglob("*.html") if "_static" not in p.relative_to(html).parts]
     return {path: _parsed(path) for path in paths}

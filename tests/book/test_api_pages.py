@@ -77,4 +77,8 @@ def test_its_example_runs(page):
 
 
 def test_no_page_describes_a_field_by_its_number(documents):
-    assert [p.name for p, s in documents.items() if "Alias for field number" in s.get_text()] == []
+    assert [
+        path.name
+        for path, page in documents.items()
+        if "Alias for field number" in page.text_content()
+    ] == []

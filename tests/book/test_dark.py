@@ -14,13 +14,17 @@ INK = re.compile(r"\b(black|white|dark|pale)\b(?! noise)", re.I)
 
 
 def figures():
-    """Cell, settings of its figure, and pixels of every captioned figure that is stored."""
+    """Settings and stored PNG of every captioned figure."""
     for path in sorted((chromium.ROOT / "book").rglob("*.ipynb")):
         for cell in nbformat.read(path, as_version=4).cells:
             settings = cell.metadata.get("mystnb", {})
             pngs = [o["data"]["image/png"] for o in cell.get("outputs", ()) if _drawn(o)]
             if "figure" in settings and pngs:
-                yield settings, image.imread(io.BytesIO(base64.b64decode(pngs[0])))[..., :3]
+                yield settings, base64.b64decode(pngs[0])
+
+
+def _pixels(png):
+    return image.imread(io.BytesIO(png))[..., :3]
 
 
 def _drawn(output):
@@ -31,9 +35,10 @@ FIGURES = list(figures())
 NAMES = [settings["figure"]["name"] for settings, _ in FIGURES]
 
 
-@pytest.mark.parametrize(("settings", "pixels"), FIGURES, ids=NAMES)
-def test_pictures_and_named_inks_are_marked(settings, pixels):
+@pytest.mark.parametrize(("settings", "png"), FIGURES, ids=NAMES)
+def test_pictures_and_named_inks_are_marked(settings, png):
     """A map inverted would lie; a line that a caption calls black needs a word in the dark."""
+    pixels = _pixels(png)
     marked = settings.get("image", {}).get("classes", "")
     coloured = np.mean(np.ptp(pixels, axis=-1) > 0.16)
     paper = np.mean(pixels.min(axis=-1) > 0.98)
@@ -50,7 +55,7 @@ def brightness(browser):
     def of(page, name):
         with browser.visit(page, theme="dark") as visit:
             shot = visit.page.locator(f"#{name} img").screenshot()
-        return 255 * image.imread(io.BytesIO(shot))[..., :3].mean()
+        return 255 * _pixels(shot).mean()
 
     return of
 

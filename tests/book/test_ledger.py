@@ -30,19 +30,24 @@ def chapters():
         yield name, [cell for cell in cells if cell.cell_type == "code"]
 
 
-def check_calls(source):
-    """Calls of anything named check, in plain Python or beside IPython's magics."""
-    for node in ast.walk(ast.parse(TransformerManager().transform_cell(source))):
+def parsed(cell):
+    """Plain Python, or Python beside IPython's magics."""
+    return ast.parse(TransformerManager().transform_cell(cell.source))
+
+
+def check_calls(tree):
+    """Calls of anything named check."""
+    for node in ast.walk(tree):
         if isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2] == "check":
             yield node
 
 
-CALLS = [
-    (name, call) for name, cells in chapters() for c in cells for call in check_calls(c.source)
-]
+CELLS = dict(chapters())
+TREES = {name: [parsed(cell) for cell in cells] for name, cells in CELLS.items()}
+CALLS = [(name, call) for name, trees in TREES.items() for t in trees for call in check_calls(t)]
 SHOWN = {
     name: "".join(o.get("data", {}).get("text/html", "") for c in cells for o in c.outputs)
-    for name, cells in chapters()
+    for name, cells in CELLS.items()
 }
 every_claim = pytest.mark.parametrize("claim", LEDGER.values(), ids=lambda claim: claim.id)
 
@@ -102,14 +107,13 @@ def bindings(tree):
 def built_by(kind):
     """Claims whose check hands over a ``Readings``, ``Parts`` or ``Some``, by whatever name."""
     found = set()
-    for _, cells in chapters():
-        source = "\n".join(TransformerManager().transform_cell(cell.source) for cell in cells)
-        given = list(bindings(ast.parse(source)))
+    for trees in TREES.values():
+        given = [(name, mentioned(node)) for tree in trees for name, node in bindings(tree)]
         making, before = {kind}, set()
         while making != before:
             before = set(making)
-            making |= {name for name, value in given if mentioned(value) & making}
-        for call in check_calls(source):
+            making |= {name for name, parts in given if parts & making}
+        for call in (call for tree in trees for call in check_calls(tree)):
             if any(mentioned(argument) & making for argument in call.args[1:]):
                 found.add(call.args[0].value)
     return found

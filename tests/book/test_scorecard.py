@@ -139,5 +139,7 @@ def test_segments_of_the_front_page_open_what_they_count(browser):
 
 
 def test_without_scripts_the_tables_are_there(document):
-    soup = document(PAGE)
-    assert len(soup.select("details.claims-work[open] .claims-table tr[id]")) == len(LEDGER)
+    tables = (
+        "//details[contains(@class, 'claims-work')][@open]//table[contains(@class, 'claims-table')]"
+    )
+    assert len(document(PAGE).xpath(f"{tables}//tr[@id]")) == len(LEDGER)

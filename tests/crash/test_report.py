@@ -159,6 +159,23 @@ def test_the_command_says_what_is_wrong(tmp_path, monkeypatch, capsys, where, me
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("option", ["--html", "--json"])
+def test_a_report_that_cannot_be_written_is_told(tmp_path, monkeypatch, capsys, option):
+    """If there is no such folder, before anything is computed."""
+    (tmp_path / "mine.py").write_text(MINE)
+    (tmp_path / "r.part").mkdir()
+    monkeypatch.chdir(tmp_path)
+    given = ["crash-test", "mine:right", "--check", "jump", option]
+    needed = f"{option}: a file in a folder that exists is needed; found "
+    for path, message in ((".", needed + "."), ("none/r", needed + "none/r"), ("r", "directory")):
+        with pytest.raises(SystemExit) as end:
+            navfilters([*given, path])
+        assert end.value.code == 2
+        told = capsys.readouterr()
+        assert message in told.err
+        assert bool(told.out) == (path == "r")
+
+
 def test_the_fixture(crash_test):
     crash_test(FILTERS["EKF"], ["linear"])
     with pytest.raises(pytest.fail.Exception, match="jump"):

@@ -1,5 +1,6 @@
 """Logs as files: what is read, and what every fault is called."""
 
+import os
 import sys
 
 import numpy as np
@@ -130,6 +131,24 @@ def test_the_command_and_its_exit_status(tmp_path, capsys):
     assert "WRONG: the filter is too sure" in capsys.readouterr().out
     assert diagnose(read_log(bad)).findings[0] in numbers.read_text()
     assert picture.stat().st_size > 1000
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
+def test_on_a_full_disk_a_log_and_its_numbers_stay_as_they_were(tmp_path, capsys):
+    log = write_log(kalman_log(steps=30), tmp_path / "log.csv")
+    numbers = tmp_path / "found.json"
+    navfilters(["diagnose", str(log), "--json", str(numbers)])
+    before = log.read_bytes(), numbers.read_bytes()
+    for path in (log, numbers):
+        path.with_name(f"{path.name}.part").symlink_to("/dev/full")
+    with pytest.raises(OSError, match=r"No space left.*log\.csv"):
+        write_log(kalman_log(steps=40), log)
+    with pytest.raises(SystemExit) as end:
+        navfilters(["diagnose", str(log), "--json", str(numbers)])
+    assert end.value.code == 2
+    assert "No space left" in (told := capsys.readouterr().err)
+    assert "found.json" in told
+    assert (log.read_bytes(), numbers.read_bytes()) == before
 
 
 @pytest.mark.parametrize(

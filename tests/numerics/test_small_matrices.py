@@ -8,10 +8,12 @@ from matrix_stacks import assert_alone, broken, sizes, square, stacks, symmetric
 from numpy.testing import assert_allclose, assert_array_equal
 
 from navfilters.numerics.small_matrices import (
+    cholesky,
     is_positive_definite,
     matmul,
     matrix,
     outer_sum,
+    right_divide,
     spectral_norm,
     vector,
 )
@@ -54,6 +56,26 @@ def test_a_written_out_product_is_the_same_alone_and_among_others():
     assert_array_equal(matmul(*innermost), products)
     A[250, 0, 0] = np.nan
     assert_array_equal(np.delete(matmul(A, B), 250, 0), np.delete(products, 250, 0))
+
+
+@pytest.mark.parametrize("broken", ["whole", "NaN", "infinite", "singular", "negative", "huge"])
+def test_one_matrix_alone_has_the_bits_that_it_has_among_others(broken):
+    """Alone it is computed by Python's floats, which raise where NumPy says infinite or NaN."""
+    rng = np.random.default_rng(1)
+    X, B = rng.normal(size=(2, 40, 2, 2))
+    A = X @ X.mT
+    A[:, 0, 1] = A[:, 1, 0]
+    changes = {"NaN": np.nan, "infinite": np.inf, "negative": -1.0}
+    if broken in changes:
+        A[:, 1, 1] *= changes[broken]
+    elif broken == "huge":
+        A[:, 0, 1] = A[:, 1, 0] = 1e200
+    elif broken == "singular":
+        A[:] = A[:, :1, :1]
+    with np.errstate(all="ignore"):
+        for function in (lambda A, B: cholesky(A), right_divide, lambda A, B: matmul(B, A)):
+            for together, one in zip(function(A, B), zip(A, B, strict=True), strict=True):
+                assert_array_equal(function(*one), together)
 
 
 @pytest.mark.parametrize("shape", [(), (7,), (2, 3)])

@@ -11,6 +11,7 @@ from textwrap import fill
 from typing import Any
 
 from navfilters.crash.suite import CHECKS, SUITES, crash_test
+from navfilters.runs import stored_arrays
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -49,6 +50,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--html", type=Path, help="write a page to this file")
     parser.add_argument("--json", type=Path, help="write the numbers to this file")
     chosen = parser.parse_args(arguments)
+    for option, path in (("--html", chosen.html), ("--json", chosen.json)):
+        if path and (path.is_dir() or not path.parent.is_dir()):
+            parser.error(f"{option}: a file in a folder that exists is needed; found {path}")
     try:
         filter = imported(chosen.filter)
         asked = chosen.check or chosen.suite
@@ -57,10 +61,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(str(error))
     report = replace(report, where=chosen.filter)
     sys.stdout.write(f"{report}\n")
-    if chosen.html:
-        chosen.html.write_text(report.html(), encoding="utf-8")
-    if chosen.json:
-        chosen.json.write_text(report.json(), encoding="utf-8")
+    try:
+        if chosen.html:
+            stored_arrays.write(chosen.html, report.html().encode())
+        if chosen.json:
+            stored_arrays.write(chosen.json, report.json().encode())
+    except OSError as error:
+        parser.error(str(error))
     return int(not report.passed)
 
 

@@ -1,6 +1,7 @@
 """A filter's log: times, innovations with their covariances, and errors where a truth is known."""
 
 import csv
+import io
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ import numpy as np
 
 from navfilters.numerics import validation
 from navfilters.numerics.extras import needed
+from navfilters.runs import stored_arrays
 from navfilters.types import Array
 
 _VECTOR = re.compile(r"(innovation|error)_(\d+)")
@@ -137,7 +139,7 @@ def read_log(path: str | Path) -> Log:
 
 
 def write_log(log: Log, path: str | Path) -> Path:
-    """Write a log that :func:`read_log` reads.
+    """Write a log that :func:`read_log` reads, all of it or nothing.
 
     Parameters
     ----------
@@ -148,6 +150,11 @@ def write_log(log: Log, path: str | Path) -> Path:
     Returns
     -------
     Path
+
+    Raises
+    ------
+    OSError
+        It cannot be written; naming the file, which is as it was.
     """
     path, columns = Path(path), {"time": log.time}
     for name, vector, matrix, cov in (
@@ -163,13 +170,16 @@ def write_log(log: Log, path: str | Path) -> Path:
     if path.suffix == ".parquet":
         parquet = needed("pyarrow.parquet", "pyarrow", "a log in Parquet")
         pyarrow = needed("pyarrow", "pyarrow", "a log in Parquet")
-        parquet.write_table(pyarrow.table(columns), path)
+        whole = io.BytesIO()
+        parquet.write_table(pyarrow.table(columns), whole)
+        stored_arrays.write(path, whole.getvalue())
         return path
-    with path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(columns)
-        for row in zip(*columns.values(), strict=True):
-            table.writerow("" if np.isnan(x) else repr(float(x)) for x in row)
+    text = io.StringIO(newline="")
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(columns)
+    for row in zip(*columns.values(), strict=True):
+        table.writerow("" if np.isnan(x) else repr(float(x)) for x in row)
+    stored_arrays.write(path, text.getvalue().encode())
     return path
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from navfilters.diagnosis.diagnose import Diagnosis, diagnose, moment
 from navfilters.diagnosis.log_file import LogError, read_log
 from navfilters.numerics.extras import needed
+from navfilters.runs import stored_arrays
 
 
 def text(found: Diagnosis, ignored: Sequence[str] = ()) -> str:
@@ -132,10 +133,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         parser.error(f"{chosen.log}: {error.strerror}")
     sys.stdout.write(text(found, log.ignored) + "\n")
-    if chosen.json:
-        chosen.json.write_text(json.dumps(found.summary(), indent=1) + "\n", encoding="utf-8")
-    if chosen.plot:
-        figure(found).savefig(chosen.plot)
+    try:
+        if chosen.json:
+            numbers = json.dumps(found.summary(), indent=1) + "\n"
+            stored_arrays.write(chosen.json, numbers.encode())
+        if chosen.plot:
+            figure(found).savefig(chosen.plot)
+    except OSError as error:
+        parser.error(str(error))
     return int(not found.consistent)
 
 

@@ -1,6 +1,7 @@
 """Where an unscented filter samples its prior, and how it weighs the samples."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -64,7 +65,11 @@ class SigmaPoints:
             (gamma, W0_m, W0_c, W_i): the scale of the offsets, the central point's weight in means
             and in covariances, and the weight of each of the 2 n other points.
         """
-        xp = np if xp is None else xp
+        if xp in (None, np) and {type(self.alpha), type(self.beta), type(self.kappa)} <= NUMBERS:
+            return _weights(self, n)
+        return self._weights(n, np if xp is None else xp)
+
+    def _weights(self, n: int, xp: Any) -> tuple[Array, Array, Array, Array]:
         given = 3.0 - n if self.kappa is None else self.kappa
         if not validation.traced(given) and np.any(n + np.asarray(given) <= 0):
             raise ValueError(
@@ -77,6 +82,13 @@ class SigmaPoints:
 
 
 ROOTS = ("cholesky", "symmetric")
+NUMBERS = {float, int, type(None)}
+
+
+@lru_cache
+def _weights(points: SigmaPoints, n: int) -> tuple[Array, Array, Array, Array]:
+    """Those of plain numbers, which a filter asks for twice an update."""
+    return points._weights(n, np)
 
 
 def root_of(cov: Array, kind: str) -> tuple[Array, Array | None]:
@@ -128,7 +140,8 @@ def offsets(prior: Gaussian, points: SigmaPoints, root: Array) -> Array:
         validation.batch(points=gamma.shape, prior=root.shape[:-2])
     S = gamma[..., None, None] * root
     batch = xp.broadcast_shapes(S.shape[:-2], prior.mean.shape[:-1])
-    columns = xp.moveaxis(xp.broadcast_to(S, (*batch, n, n)), -1, 0)
+    k = len(batch) + 1
+    columns = xp.permute_dims(xp.broadcast_to(S, (*batch, n, n)), (k, *range(k)))
     return xp.concat([xp.zeros_like(columns[:1]), columns, -columns], axis=0)
 
 

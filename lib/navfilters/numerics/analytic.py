@@ -75,4 +75,4 @@ def atan2(y: Array, x: Array) -> Array:
 
 
 def _is_complex(*arrays: Array) -> bool:
-    return any(a.dtype.kind == "c" for a in arrays)
+    return "c" in [a.dtype.kind for a in arrays]

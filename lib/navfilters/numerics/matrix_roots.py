@@ -49,7 +49,7 @@ def semidefinite_root(A: Array) -> tuple[Array, Array | None]:
             break
     if not isinstance(A, np.ndarray):
         return _where_any(~definite, _compiled_root, _plain_root, A, L)
-    if np.all(definite):
+    if definite.all():
         return L, None
     look = ~definite & np.isfinite(A).all(axis=(-2, -1))
     S, T, singular = _deferred_cholesky(A[look])

@@ -1,6 +1,7 @@
 """Divergence maps, or ten filters with noise: ``python -m navfilters.papers.perea2007``."""
 
 import argparse
+import io
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,6 +20,7 @@ from navfilters.papers.perea2007.divergence_maps import (
 from navfilters.papers.perea2007.experiment import FILTERS, Setup
 from navfilters.papers.perea2007.noise_table import simulate, table
 from navfilters.papers.perea2007.noisy_fix import UPDATES
+from navfilters.runs import stored_arrays
 from navfilters.runs.progress import bar
 from navfilters.types import Array
 
@@ -56,7 +58,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 found[key] = compute(estimator, chosen.size, changed=changed, **options)
         sys.stdout.write(f"{name}: {np.mean(~(found[f'starts/{name}'] <= 0.1)):.1%} above 0.1\n")
     Path(chosen.out).parent.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(f"{chosen.out}.npz", **{k.replace("/", " "): v for k, v in found.items()})
+    content = io.BytesIO()
+    np.savez_compressed(content, **{k.replace("/", " "): v for k, v in found.items()})
+    stored_arrays.write(Path(f"{chosen.out}.npz"), content.getvalue())
     for path in _draw(found, chosen.size, chosen.out):
         sys.stdout.write(f"{path}\n")
 
