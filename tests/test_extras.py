@@ -60,11 +60,7 @@ def test_every_module_is_imported_or_says_what_it_needs():
         "navfilters.book.plotting | plotting needs matplotlib: pip install navfilters[book]",
         f"navfilters.oracles.later_filters | {MPMATH}",
         f"navfilters.oracles.perea2007 | {MPMATH}",
-        f"navfilters.oracles.sar_information | {MPMATH}",
-        f"navfilters.oracles.sar_second_order | {MPMATH}",
-        f"navfilters.oracles.sar_trn | {MPMATH}",
         f"navfilters.oracles.two_by_two | {MPMATH}",
-        f"navfilters.oracles.uneven_gravity | {MPMATH}",
         'navfilters.runs.compiled | engine="jax" needs JAX: pip install navfilters[jax]',
     ]
 

@@ -45,6 +45,14 @@ def test_a_last_bit_is_one_and_changes_the_map_a_little():
     assert 0 < np.abs(changed / I - 1).max() < 1e-9
 
 
+def test_maps_of_one_sweep_are_those_of_three():
+    mtsof = FILTERS["mtSOF"]  # rounding decides
+    found = divergence_maps.over_both(mtsof, 4, 3)
+    assert_array_equal(found.starts, divergence_maps.over_starts(mtsof, 4))
+    assert_array_equal(found.changed, divergence_maps.over_starts(mtsof, 4, changed=True))
+    assert_array_equal(found.noises, divergence_maps.over_noises(mtsof, 3))
+
+
 def test_a_change_is_relative_and_has_a_floor():
     found = divergence_maps.relative_change([1.0, 2.0, 1.0, np.nan], [1.0, 3.0, np.nan, 1.0])
     assert_array_equal(found, [2**-52, 0.5, np.nan, np.nan])

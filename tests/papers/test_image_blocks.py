@@ -132,6 +132,17 @@ def test_runs_that_share_a_table_are_the_loop_of_before():
     assert_array_equal(own.log[2].speed, plain.log[2].speed)
 
 
+def test_runs_that_share_a_table_go_together_as_they_do_alone():
+    setup = replace(CASES["TC-2"], walk=False)
+    sets = {(k, i): table(k, peak) for k in (1, 2, 3) for i, peak in enumerate((0.5, 3.0))}
+    together = DifferentImages(setup, range(5), lambda k, i: sets[k, i % 2], 0, SMALL)
+    alone = DifferentImages(setup, range(5), lambda k, i: sets[k, i % 2]._replace(), 0, SMALL)
+    results = [monte_carlo(setup, 3, 5, 0, measure=m) for m in (together, alone)]
+    assert_array_equal(results[1].errors, results[0].errors)
+    for one, other in zip(together.log, alone.log, strict=True):
+        assert_equal(one, other)
+
+
 def test_each_run_has_its_own_set():
     tables = [[table(k, 0.0), table(k, 6.0)] for k in (1, 2, 3)]
     _, images = fly_own_images("TC-2", tables, 4)

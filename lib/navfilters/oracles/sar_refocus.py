@@ -57,7 +57,9 @@ class Pixels:
         s = (self.wavelength * f[: lines // 2 + 1] / 2) ** 2  # the same for negative frequencies
         D, other = (np.sqrt(1 - s / v**2) for v in (self.velocity, self.velocity + faster))
         less = (4 * np.pi / self.wavelength * (other - D)).astype(np.float32)  # some rad in all
-        turn = np.exp(np.complex64(1j) * (less * self.slant_range.astype(np.float32)))
+        angle = less * self.slant_range.astype(np.float32)
+        turn = np.empty(angle.shape, np.complex64)
+        turn.real, turn.imag = np.cos(angle), np.sin(angle)  # a third of a complex exponential
         turn = np.concatenate([turn, turn[1 : (lines + 1) // 2][::-1]])
         return f, self.azimuth * turn
 

@@ -226,7 +226,10 @@ def second_order(
     for step, G_k in zip(reversed(steps), reversed(before), strict=True):
         gain, n = (into @ step.K)[:, curved], G_k.shape[1]
         half = np.einsum("ia,apq->ipq", gain, step.bend[curved]) / 2
-        A[:, :n, :n] += G_k.T @ half @ G_k
+        left = G_k.T @ half
+        for column in range(0, n, 32):  # so few at once that BLAS starts no threads, which wait
+            columns = slice(column, min(column + 32, n))
+            A[:, :n, columns] += left @ G_k[:, columns]
         into = into @ (np.eye(9) - step.K @ step.H) @ step.F
     shift = np.trace(A, axis1=1, axis2=2)
     return np.sum((whiten @ G) ** 2), shift @ shift, 2 * np.sum(A * A)

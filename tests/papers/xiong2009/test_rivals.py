@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_equal
 
 from navfilters import run
 from navfilters.estimators import Modes, Robust
@@ -18,6 +18,7 @@ from navfilters.papers.xiong2009 import (
     course,
     fly,
     fly_rival,
+    fly_rivals,
     measurements,
     one_direction,
     truth,
@@ -157,3 +158,12 @@ def test_an_imm_written_apart_flies_the_same():
     apart = flown - (flights.states[:, 0] - x)[..., :3]
     assert np.abs(apart).max() < 0.03 * np.abs(flown).max()
     assert np.abs(apart[180:]).max() < 20
+
+
+def test_rivals_of_one_model_fly_as_they_do_alone():
+    names = ("gate", "constant Q", "EKF", "strong tracking", "AEKF", "IMM", "REKF")
+    some, flights = {name: RIVALS[name] for name in names}, course(SHORT, [3, 4])
+    found = fly_rivals(some, flights, SHORT)
+    assert tuple(found) == names
+    for name, flown in found.items():
+        assert_equal(flown, fly_rival(some[name], flights, SHORT))

@@ -17,7 +17,7 @@ from navfilters.space.navigation_state import NavigationState
 
 @dataclass(frozen=True, eq=False)
 class DifferentImages:
-    """Measurements of the closed loop, each run with images that it shares with no other.
+    """Measurements of the closed loop, not all runs with the same images.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class DifferentImages:
     runs : sequence of int
         Which: see ``navfilters.papers.pogorelsky2020.noise_draws.noise``.
     tables : callable
-        (k, place of the run in ``runs``) -> ImageTable.
+        (k, place of the run in ``runs``) -> ImageTable, the same object for runs that share one.
     seed : int
     imaging : Imaging
     geometry : {"nominal", "predicted"}
@@ -55,35 +55,32 @@ class DifferentImages:
         Measurement
             r_f (runs, 3), slant_range (runs,), speed (runs,).
         """
+        groups = dict[int, tuple[ImageTable, list[int]]]()  # runs that share an image go together
+        for i in range(len(self.runs)):
+            table = self.tables(k, i)
+            groups.setdefault(id(table), (table, []))[1].append(i)
         found, attempts = list[Measurement](), list[Attempt]()
-        for i, run in enumerate(self.runs):
+        for table, places in groups.values():
             images = Images(
                 self.setup,
-                [run],
+                [self.runs[i] for i in places],
                 self.seed,
                 self.imaging,
                 self.geometry,
-                partial(_alone, self.tables(k, i)),
+                partial(_alone, table),
             )
-            alone = NavigationState(*(part[i : i + 1] for part in state))
-            found.append(images(k, alone))
+            found.append(images(k, NavigationState(*(part[places] for part in state))))
             attempts.extend(images.log)
-        parts = zip(*attempts, strict=True)
-        next(parts)
-        start, speed, r_f, ended, absent = parts
-        self.log.append(
-            Attempt(
-                k,
-                np.concatenate(start),
-                np.concatenate(speed),
-                np.concatenate(r_f),
-                tuple(e for each in ended for e in each),
-                np.concatenate(absent),
-            )
+        order = np.argsort(np.concatenate([places for _, places in groups.values()]))
+        start, speed, r_f, absent = (
+            np.concatenate([getattr(attempt, name) for attempt in attempts])[order]
+            for name in ("start", "speed", "r_f", "absent")
         )
-        return Measurement(*(np.concatenate(part) for part in zip(*found, strict=True)))
+        ended = [e for attempt in attempts for e in attempt.ended]
+        self.log.append(Attempt(k, start, speed, r_f, tuple(ended[i] for i in order), absent))
+        return Measurement(*(np.concatenate(part)[order] for part in zip(*found, strict=True)))
 
 
 def _alone(table: ImageTable, _setup: Setup, _k: int, _imaging: Imaging) -> ImageTable:
-    """The one table of a run."""
+    """The one table of some runs."""
     return table

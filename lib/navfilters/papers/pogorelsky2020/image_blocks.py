@@ -158,7 +158,7 @@ class BlockPlace:
             r_f = flight.ground_point(t, block.centre_range, height)
             place = acquired.scene.map.position(*ecef_to_geodetic(r_f)[:2])
             last, height = height, float(acquired.scene.height(*place))
-            if height == last:
+            if abs(height - last) < 1e-6:
                 break
         r, v = flight.position(t), flight.velocity(t)
         a = acquired.acceleration(np.concatenate([r, v]))

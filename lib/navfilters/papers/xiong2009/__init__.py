@@ -54,6 +54,7 @@ from navfilters.papers.xiong2009.rivals import (
     Rival,
     course,
     fly_rival,
+    fly_rivals,
     imm,
 )
 from navfilters.papers.xiong2009.side_by_side import Flown, SideBySide
@@ -92,6 +93,7 @@ __all__ = [
     "errors_each_second",
     "fly",
     "fly_rival",
+    "fly_rivals",
     "gamma_limits",
     "imm",
     "lemma_bound",

@@ -1,6 +1,6 @@
 """Other answers to an unknown thrust, flown as the paper's filters are."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Literal, NamedTuple
 
@@ -10,9 +10,11 @@ from navfilters.estimators.filter import Filter
 from navfilters.estimators.gated_inflation import GatedInflation
 from navfilters.estimators.interacting import InteractingModels, Modes
 from navfilters.estimators.robust import AdaptiveRobust
+from navfilters.estimators.rule import Rule
 from navfilters.estimators.strong_tracking import StrongTracking
 from navfilters.papers.xiong2009.experiment import ESTIMATORS, Setup
 from navfilters.papers.xiong2009.monte_carlo import measurements
+from navfilters.papers.xiong2009.side_by_side import Flown, SideBySide
 from navfilters.papers.xiong2009.true_flight import truth
 from navfilters.runs.consistency import nees, nis
 from navfilters.runs.sweeping import sweep
@@ -193,21 +195,65 @@ def fly_rival(
     Flight
         Batch axes (k, ..., seeds); k is 1 without arrays.
     """
-    options = {"dynamics": rival.dynamics(setup, arcs), "record": _kept}
-    z = flights.z[:, None]
+    (flown,) = _fly((rival.filter,), rival, flights, setup, arcs)
+    return flown
+
+
+def fly_rivals(rivals: Mapping[Any, Rival], flights: Course, setup: Setup) -> dict[Any, Flight]:
+    """Rivals through the same flights; those of one model predict together where they can.
+
+    Parameters
+    ----------
+    rivals : mapping
+        Name to Rival, whose deviations are single numbers.
+    flights : Course
+    setup : Setup
+        As of ``fly_rival``.
+
+    Returns
+    -------
+    dict
+        Name to Flight: to the last bit as if each flew alone.
+    """
+    together, flown = dict[Any, list[Any]](), dict[Any, Flight]()
+    for name, rival in rivals.items():
+        alone = not isinstance(rival.filter, Filter) or (rival.filter.rule or Rule()).parts
+        together.setdefault((rival[1:], name if alone else ""), []).append(name)
+    for names in together.values():
+        filters = tuple(rivals[name].filter for name in names)
+        flown |= zip(names, _fly(filters, rivals[names[0]], flights, setup), strict=True)
+    return {name: flown[name] for name in rivals}
+
+
+def _fly(
+    filters: tuple[Any, ...],
+    rival: Rival,
+    flights: Course,
+    setup: Setup,
+    arcs: tuple[Any, ...] | None = None,
+) -> list[Flight]:
+    """Filters of one rival's model."""
+    several = len(filters) > 1
     flown = sweep(
-        rival.filter,
+        SideBySide(filters) if several else filters[0],
         rival.prior(setup),
-        z,
+        flights.z[:, None],
         setup.sensor,
         z_per_step=True,
         progress=False,
-        **options,
+        dynamics=rival.dynamics(setup, arcs),
+        record=_all_kept if several else _kept,
     )
-    mean, cov, y, S = flown.record
-    with np.errstate(all="ignore"):
-        error = flights.states[:, None] - mean
-        return Flight(error, nees(error, cov), nis(y[1:], S[1:]))
+    records, found = flown.record if several else (flown.record,), list[Flight]()
+    for mean, cov, y, S in records:
+        with np.errstate(all="ignore"):
+            error = flights.states[:, None] - mean
+            found.append(Flight(error, nees(error, cov), nis(y[1:], S[1:])))
+    return found
+
+
+def _all_kept(flown: Flown) -> tuple[Any, ...]:
+    return tuple(_kept(state) for state in flown.states)
 
 
 def _kept(state: Any) -> tuple[Any, ...]:
