@@ -5,9 +5,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy import fft
 
+from navfilters.sar.in_parts import blocks
 from navfilters.sar.raw.flight import Flight
 from navfilters.sar.raw.radar import LIGHT, Radar, Window
 from navfilters.types import Array
+
+CACHED = 2**15
+"""Samples of pulses that are computed at once: temporary arrays of all would come from the system
+page by page, which costs as much as they do."""
 
 
 class Echoes(NamedTuple):
@@ -53,11 +58,14 @@ def point_echo(
     t = window.first_time + np.arange(window.pulses) / radar.prf
     distance, pattern = _history(radar, flight, p, t)
     delay = np.arange(oversampling * window.ranges) / (oversampling * radar.sampling)
-    into = delay + 2 * (window.near_range - distance[:, None]) / LIGHT
-    phase = np.pi * radar.chirp_rate * (into - radar.pulse_length / 2) ** 2
-    inside = (into >= 0) & (into < radar.pulse_length)
     carrier = pattern * np.exp(-4j * np.pi * distance / radar.wavelength)
-    return np.where(inside, _turned(phase), 0) * carrier[:, None]
+    echo = np.empty((window.pulses, len(delay)), np.complex128)
+    for pulses in blocks(window.pulses, max(CACHED // len(delay), 1)):
+        into = delay + 2 * (window.near_range - distance[pulses, None]) / LIGHT
+        phase = np.pi * radar.chirp_rate * (into - radar.pulse_length / 2) ** 2
+        inside = (into >= 0) & (into < radar.pulse_length)
+        echo[pulses] = np.where(inside, _turned(phase), 0) * carrier[pulses, None]
+    return echo
 
 
 def _history(radar: Radar, flight: Flight, p: Array, t: Array) -> tuple[Array, Array]:
