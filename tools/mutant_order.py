@@ -143,6 +143,8 @@ def statement(source: bytes, line: int) -> range:
     """The lines of the innermost statement at a line, of a compound one its head."""
     around = [n for n in ast.walk(ast.parse(source)) if isinstance(n, ast.stmt)]
     around = [n for n in around if n.lineno <= line <= n.end_lineno]
+    if not around:  # a decorator
+        return range(line, line + 1)
     inner = max(around, key=lambda n: n.lineno)
     body = getattr(inner, "body", None)
     return range(inner.lineno, max(line + 1, body[0].lineno if body else inner.end_lineno + 1))
