@@ -12,7 +12,7 @@ from navfilters.space.earth_fixed_orbit import EARTH_RATE
 
 @pytest.fixture(scope="module")
 def few(imaging):
-    return replace(imaging, near=2.0, reach=8.5, steps=(4.0, 1.0))
+    return replace(imaging, near=2.0, reach=8.5, steps=(4.0, 3.0))
 
 
 @pytest.fixture(scope="module")
