@@ -22,7 +22,7 @@ def test_classes_are_all_frequent_and_in_the_order_of_l_band():
     assert sorted(COVER, key=lambda name: COVER[name].level) == ORDER
     assert_allclose(sum(map(frequency, COVER)), 1, rtol=1e-6)
     assert all(frequency(name) > 0.05 for name in COVER)
-    assert all(SPACING < kind.length and 0 < kind.texture < 5 for kind in COVER.values())
+    assert all(kind.length > SPACING and 0 < kind.texture < 5 for kind in COVER.values())
 
 
 def test_a_drawn_cover_has_each_class_as_often_as_it_should():
