@@ -37,3 +37,10 @@ def test_values_are_frozen():
     changing = [each.__name__ for each in EVERY if not each.__dataclass_params__.frozen]
     assert len(EVERY) > 100
     assert changing == ["ByComplexStep"]
+
+
+def test_what_is_computed_is_not_shown():
+    """A value's text is what it was made of."""
+    for each in EVERY:
+        for field in dataclasses.fields(each):
+            assert field.init or not field.repr, f"{each.__name__}.{field.name}"
