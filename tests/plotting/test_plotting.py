@@ -188,4 +188,9 @@ def test_tails_of_the_nees():
     assert_allclose(one.get_ydata(), [1, 0.75, 0.5, 0.25])
     assert (one.get_color(), two.get_linestyle()) == ("red", "--")
     assert_allclose(bound.get_xdata(), -2 * np.log(0.01))
+    ax = figure.axes[0]  # where a run in 500, and a NEES of 150, can be read
+    assert (ax.get_yscale(), ax.get_xscale()) == ("log", "linear")
+    assert ax.get_ylim()[0] < 1 / 500 < 1 < ax.get_ylim()[1]
+    assert ax.get_xlim()[0] == 0
+    assert ax.get_xlim()[1] > 150
     plt.close(figure)

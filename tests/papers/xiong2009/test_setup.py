@@ -144,6 +144,13 @@ REFUSED = {
 }
 
 
+def test_a_burn_may_last_from_the_first_second_to_the_last():
+    flown = truth(replace(SHORT, burns=((0, 2000),)))
+    assert flown.thrust.magnitude == 0.45
+    speeds = np.linalg.norm(flown.states[[0, -1], 3:], axis=1)
+    assert speeds[1] > speeds[0]
+
+
 @pytest.mark.parametrize(("call", "message"), REFUSED.values(), ids=REFUSED)
 def test_bad_input_is_refused_by_name(call, message):
     with pytest.raises(ValueError, match=message):
