@@ -31,6 +31,7 @@ def test_a_drawn_cover_has_each_class_as_often_as_it_should():
     assert dB.shape == (1501, 1501)
     four = 4 / np.sqrt(dB.size / (4 * np.pi * (PATCH / SPACING) ** 2))
     water = frequency("water")  # darker than -9.5 dB, and nearly nothing else
+    assert_allclose(np.median(dB[dB < -9.5]), COVER["water"].level, rtol=0, atol=0.1)
     assert_allclose(np.mean(dB < -9.5), water, rtol=0, atol=four * np.sqrt(water))
     mean = sum(frequency(name) * kind.level for name, kind in COVER.items())
     square = sum(frequency(n) * (k.level**2 + k.texture**2) for n, k in COVER.items())
