@@ -1,11 +1,13 @@
-"""What a sweep could gain, beside a Kalman filter of the linearised problem."""
+"""What checks ask: the problem of their name; the gain of a filter of the linearised problem."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 from numpy.testing import assert_allclose
 
-from navfilters.crash.problem_checks import _swept
+from navfilters.crash import CHECKS
+from navfilters.crash.problem_checks import _swept, patients
 from navfilters.models import RangeBearing
 
 
@@ -24,3 +26,12 @@ def test_the_exact_share_is_that_of_a_linear_filter_step_by_step():
         assert_allclose(found.exact[i], np.linalg.norm(error) / 10, rtol=1e-9)
     assert_allclose(found.gain, [5.0 / 10, 5.0 / 10])
     assert_allclose(found.parameter, [1.0, 2.0])
+
+
+def test_a_check_on_a_problem_is_on_that_of_its_name():
+    asked = {n: c.cases.args for n, c in CHECKS.items() if isinstance(c.cases, partial)}
+    assert len(asked) == 8
+    for name, (problem, runs) in asked.items():
+        assert problem == name
+        assert problem in patients()
+        assert runs == (40 if name.startswith("images") else 20)
