@@ -135,6 +135,15 @@ def test_a_void_beside_the_square_is_felt(tmp_path):
             assert_allclose(found.posts, clean.posts, rtol=0, atol=1e-6)
 
 
+def test_a_geoid_lifts_the_median_as_it_lifts_the_posts(tmp_path):
+    path = dem(tmp_path / "a.tif", hills())
+    for geoid in (-27.0, 45.5):
+        apart = median_height(path, PLACE, 2000.0, geoid=geoid) - median_height(path, PLACE, 2000.0)
+        assert apart == pytest.approx(geoid, abs=1e-9)
+        posts = (read_terrain(path, PLACE, 2000.0, geoid=g).posts for g in (geoid, 0.0))
+        assert_allclose(next(posts) - next(posts), geoid, rtol=1e-9)
+
+
 def test_heights_in_feet(tmp_path):
     """Declared, they are turned into metres; undeclared, high ones are refused."""
     metres = hills(level=3200.0)
