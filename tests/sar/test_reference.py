@@ -41,6 +41,14 @@ def test_a_small_reference_is_the_middle_of_a_large_one(acquired):
     assert_allclose(small[1:-1, 1:-1], large[61:120, 61:120], atol=1e-3)
 
 
+def test_what_lies_on_the_last_row_or_column_has_no_four_neighbours():
+    """And is left out; on the first ones, it is in its pixel alone."""
+    got = np.zeros(9, np.float32)
+    places = np.array([[2.0, 1.0], [1.0, 2.0], [2.0, 2.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.0]])
+    _add(got, 3, *places.T, 2.0 ** np.arange(6))
+    assert_allclose(got.reshape(3, 3), [[32, 16, 0], [8, 0, 0], [0, 0, 0]])
+
+
 @pytest.mark.parametrize("around", [-390.0, 390.0])
 def test_relief_of_almost_400_m_is_brought_in_from_beyond_the_edge(around):
     """A shaft, and a tower, in a plain: from where the small image ends to 465 m beyond, the plain
