@@ -166,6 +166,8 @@ def test_nine_errors_of_runs_and_their_deviations():
     axes = figure.axes
     assert len(axes) == 9
     assert [ax.get_ylim()[1] for ax in axes[::3]] == [10, 20, 30]
+    for ax in axes:  # one time for all
+        assert ax.get_shared_x_axes().joined(ax, axes[0])
     for i, scale in ((1, 1.0), (5, 1.0), (8, np.rad2deg(1.0))):
         lines = axes[i].get_lines()
         assert len(lines) == 5 + 1 + 4  # runs, mean, both deviations to each side
