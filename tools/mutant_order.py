@@ -1,8 +1,9 @@
 """Which unit tests may see an edit of the library, the likely ones first.
 
 First those that run the edited statement, the quickest before the rest; then those that run
-anything of its file; last those of the files that name what it defines or mirror what imports it:
-what is computed at import or kept in a cache no test seems to run.
+anything of its file; last those of the files that name what it defines or mirror what imports it,
+and those of no package, which are about all: what is computed at import or kept in a cache no test
+seems to run.
 """
 
 import ast
@@ -136,6 +137,7 @@ class Suite:
         tests += self.running(mutant.file, range(1, source.count(b"\n") + 1))
         for files in tiers(root, mutant.file):
             tests += self.of_files(files)
+        tests += self.quickest(t for t in self.seconds if t.count("/") == 1)
         return list(dict.fromkeys(tests))
 
 

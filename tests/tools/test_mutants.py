@@ -1,6 +1,7 @@
 """The mutation tool on planted code: which edits it makes, and which of them tests see."""
 
 import ast
+from copy import copy
 
 import mutant_order
 import pytest
@@ -177,6 +178,9 @@ def test_the_tests_that_run_a_line_are_known_and_their_time(tree, suite):
     assert suite.running(file, [4]) == []
     (tree / "tests/small/test_else.py").write_text(ELSE)
     assert suite.order(tree, planted("max", "min")) == [slower, it, other]
+    more = copy(suite)
+    more.seconds = {"tests/test_of_all.py::test_it": 0.0, **suite.seconds}
+    assert more.order(tree, planted("max", "min"))[3:] == ["tests/test_of_all.py::test_it"]
 
 
 def test_all_tests_of_a_file_use_what_its_fixture_runs(tree):
