@@ -74,6 +74,8 @@ def seen(root: Path, mutant: Mutant, suite: Suite, limit: float) -> tuple[str, f
     finally:
         path.write_bytes(source)
         Path(cache_from_source(str(path))).unlink(missing_ok=True)
+    if by == "import" and first_failure(root, tests[:1], 60) == by:
+        raise SystemExit("pytest cannot begin, with or without a mutant")
     return by, round(perf_counter() - start, 1)
 
 

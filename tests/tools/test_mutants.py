@@ -220,6 +220,13 @@ def test_what_tests_see_and_what_survives(tree, suite, old, new, limit, by):
     assert (tree / mutant.file).read_text() == PLANTED
 
 
+def test_a_pytest_that_cannot_begin_sees_nothing(tree, suite):
+    (tree / "conftest.py").write_text("import nothing\n")
+    with pytest.raises(SystemExit, match="cannot begin"):
+        seen(tree, planted("+", "-"), suite, 60)
+    assert (tree / "lib/navfilters/small/planted.py").read_text() == PLANTED
+
+
 def test_files_run_where_a_test_has_lost_its_name(tree):
     file = tree / "tests/small/test_planted.py"
     names = [f"tests/small/test_planted.py::test_{name}" for name in ("it", "gone")]
