@@ -100,7 +100,8 @@ def summary(seed: int, rows: list[dict]) -> dict:
     kinds = Counter(OTHERS.get(row["seen_by"], "seen") for row in done)
     first = sum(row["seen_by"] not in OTHERS and row["tries"] == 1 for row in done)
     score = 100 * kinds["seen"] / max(1, len(done) - kinds["explained"])
-    counts = {"seed": seed, "count": len(done), "seen_at_first": first, **kinds}
+    counts = {"seed": seed, "count": len(done), "seen_at_first": first}
+    counts |= {kind: kinds[kind] for kind in ("seen", *OTHERS.values())}
     return {**counts, "per_cent_seen": round(score, 1), "mutants": done}
 
 

@@ -253,6 +253,6 @@ def test_the_report_counts_apart():
     names = [("t::a", 1), ("t::b", 2), ("", 1), ("stopped", 1), ("explained", 1)]
     rows = [{"seen_by": by, "tries": tries} for by, tries in names]
     report = summary(1, [*rows, {"line": 1}])
-    counts = {"seen": 2, "survived": 1, "stopped": 1, "explained": 1}
+    counts = {"seen": 2, "survived": 1, "stopped": 1, "explained": 1, "doubtful": 0}
     expected = {"seed": 1, "count": 5, "seen_at_first": 1, **counts, "per_cent_seen": 50.0}
     assert report == {**expected, "mutants": rows}
