@@ -71,6 +71,15 @@ def test_output_times_do_not_decide_the_residual(t):
     assert_allclose(residual, np.tile([0.0, 1.0], (len(times), 1)), atol=1e-9)
 
 
+def test_no_piece_is_longer_than_a_200th_of_the_whole():
+    """Intervals of which 100.6 and 99.4 would fit: 101 and 100 pieces, of one length in each."""
+    times, _ = reference_residual(FALLING, Reference(fall), np.array([1.0, 2.006, 3.0]))
+    first, second = times[:101], times[101:]
+    assert len(second) == 100
+    assert_allclose(first, 1 + 1.006 * (np.arange(101) + 0.5) / 101, rtol=1e-13)
+    assert_allclose(second, 2.006 + 0.994 * (np.arange(100) + 0.5) / 100, rtol=1e-13)
+
+
 def test_the_residual_is_each_pieces_average():
     """x = t^3 under a rate of 10 t^9, averaged by hand over pieces of a 200th of the whole."""
     system = ContinuousSystem(

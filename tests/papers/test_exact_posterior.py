@@ -131,3 +131,20 @@ def test_it_refuses_what_it_cannot_be(changed, message):
     given = {"z_mean": SETUP.z, "updates": 1, "R": R} | changed
     with pytest.raises(ValueError, match=message):
         ExactPosterior(**given)
+
+
+@pytest.mark.parametrize("polar", [False, True])
+def test_bearings_that_are_turned_have_the_level_of_the_problem_turned(polar):
+    """A mean bearing beyond half a turn, where the point's own is on the other branch."""
+    n, noise = 4, np.diag([4.0, 0.03])
+    place = np.array([[142.0, 0.4], [140.5, 0.15], [141.0, 0.32]])
+
+    def points(turned):
+        bearing = place[:, 1] + turned
+        return place[:, :1] * np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
+
+    wanted = ExactPosterior([141.0, 0.3], n, noise).level(points(0.0), polar=polar)
+    assert ((wanted > 0) & (wanted < 1)).all()
+    for turns in (-1, 0, 1):
+        turned = ExactPosterior([141.0, 3.3 + 2 * np.pi * turns], n, noise)
+        assert_allclose(turned.level(points(3.0), polar=polar), wanted, rtol=1e-6)

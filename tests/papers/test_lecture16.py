@@ -25,6 +25,7 @@ from navfilters.papers.lecture16 import (
     experiments,
     sampled,
 )
+from navfilters.papers.lecture16.noise import sum_of_sines
 from navfilters.runs import records
 from navfilters.runs.consistency import nees
 
@@ -206,6 +207,22 @@ def test_noise_has_the_density_it_should():
     assert_allclose(square, 2 * bandwidth, rtol=0.05)
     seconds = w.reshape(100, 50, 2, 20).sum(axis=1) * 0.02
     assert_allclose((seconds**2).mean(axis=(0, 2)), 1, rtol=0.08)
+
+
+def test_a_noise_is_its_cosines_and_sines_at_however_many_times():
+    """Its digits do not depend on how many are asked for; added up by hand."""
+    waves = np.random.default_rng(0).standard_normal((2 * 37, 3))
+    noise, t = sum_of_sines(waves, 11.0), np.linspace(0, 11, 60)
+    found = noise(t)
+    assert_array_equal(noise(t[:7]), found[:7])
+    assert_allclose(noise(t.reshape(12, 5)), found.reshape(12, 5, 3), rtol=1e-12)
+    phase = 2 * np.pi * np.multiply.outer(t, np.arange(37) + 0.5) / 11.0
+    wanted = np.zeros((60, 3))
+    for k in range(37):
+        wanted += np.cos(phase[:, k, None]) * waves[k] + np.sin(phase[:, k, None]) * waves[37 + k]
+    assert_allclose(found, wanted, rtol=0, atol=1e-11)
+    for asked in (float(t[9]), t[9], np.array(t[9])):
+        assert_allclose(noise(asked), wanted[9], rtol=0, atol=1e-11)
 
 
 def test_a_seed_is_an_experiment():

@@ -1,6 +1,7 @@
 """Patches of a PALSAR product: where they are, what is read, what does not fit."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import palsar_files as files
@@ -25,6 +26,7 @@ from navfilters.papers.pogorelsky2020.real_flight import first_lines, fitted, fl
 from navfilters.papers.pogorelsky2020.real_loop import run_filter
 from navfilters.papers.pogorelsky2020.real_patches import cut_patches
 from navfilters.sar.palsar.opening import open_product
+from navfilters.sar.palsar.orbit_and_pulse import StateVectors
 from navfilters.sar.palsar.product import Product
 from navfilters.sar.raw.echoes_of_points import _half_aperture
 from navfilters.sar.raw.flight import Flight
@@ -45,6 +47,27 @@ def test_the_state_vectors_flight_is_the_orbit(product, orbit):
         x = np.stack([orbit(s) for s in epoch + t])
         assert_allclose(flight.position(t), x[:, :3], rtol=0, atol=1e-5)
         assert_allclose(flight.velocity(t), x[:, 3:], rtol=0, atol=1e-6)
+
+
+def circle(t):
+    """Position and velocity on a tilted circle of 7071 km, once around in 99 minutes."""
+    turn, across = 2 * np.pi / 5940.0, np.array([0.6, 0.0, 0.8])
+    phase = turn * np.asarray(t)[..., None]
+    along = np.array([0.0, 1.0, 0.0])
+    r = np.cos(phase) * along + np.sin(phase) * across
+    v = turn * (np.cos(phase) * across - np.sin(phase) * along)
+    return 7.071e6 * r, 7.071e6 * v
+
+
+@pytest.mark.parametrize("epoch", [43000.0, 43031.0, 42955.0])
+def test_the_flight_through_a_circles_state_vectors_is_the_circle(epoch):
+    """To what is promised: 10 micrometres and 1 micrometre a second."""
+    times = 43000.0 + 60.0 * np.arange(-13, 15)
+    product = SimpleNamespace(state_vectors=StateVectors(times, *circle(times)))
+    flight, t = flight_through(product, epoch), np.linspace(-15.0, 15.0, 31)
+    r, v = circle(epoch + t)
+    assert_allclose(flight.position(t), r, rtol=0, atol=1e-5)
+    assert_allclose(flight.velocity(t), v, rtol=0, atol=1e-6)
 
 
 def test_patches_avoid_missing_lines():

@@ -126,3 +126,9 @@ def test_the_table_names_every_trial():
     assert len(lines) == 38 + 1
     assert lines[5].startswith("plane, 72 images")
     assert all(np.isfinite(float(line[34:40])) for line in lines[1:])
+
+
+def test_a_trial_is_a_clock_of_a_tenth_of_a_millisecond_and_nothing_else():
+    """As the chapter says of its flights where it says no more."""
+    ideal = Trial("plane", clock=0.1e-3, late=0.0, pointing=0.0, told=True, delay=0.0)
+    assert Trial() == ideal

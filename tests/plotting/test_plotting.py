@@ -166,6 +166,8 @@ def test_nine_errors_of_runs_and_their_deviations():
     axes = figure.axes
     assert len(axes) == 9
     assert [ax.get_ylim()[1] for ax in axes[::3]] == [10, 20, 30]
+    for ax in axes:  # one time for all
+        assert ax.get_shared_x_axes().joined(ax, axes[0])
     for i, scale in ((1, 1.0), (5, 1.0), (8, np.rad2deg(1.0))):
         lines = axes[i].get_lines()
         assert len(lines) == 5 + 1 + 4  # runs, mean, both deviations to each side
@@ -188,4 +190,9 @@ def test_tails_of_the_nees():
     assert_allclose(one.get_ydata(), [1, 0.75, 0.5, 0.25])
     assert (one.get_color(), two.get_linestyle()) == ("red", "--")
     assert_allclose(bound.get_xdata(), -2 * np.log(0.01))
+    ax = figure.axes[0]  # where a run in 500, and a NEES of 150, can be read
+    assert (ax.get_yscale(), ax.get_xscale()) == ("log", "linear")
+    assert ax.get_ylim()[0] < 1 / 500 < 1 < ax.get_ylim()[1]
+    assert ax.get_xlim()[0] == 0
+    assert ax.get_xlim()[1] > 150
     plt.close(figure)

@@ -76,6 +76,15 @@ def test_a_coarse_step_beyond_a_limit_ends_nothing(start):
     assert hill_climb(lambda v: -((v - 8) ** 2), start, (4.0, 1.0), (-10.0, 10.0)).speed == 8.0
 
 
+@pytest.mark.parametrize("peak", [-9.0, 8.0])
+def test_a_peak_beside_a_limit_is_seen_by_asking_at_the_limit(peak):
+    limits = (-10.0, 9.0)
+    climb = hill_climb(lambda v: -((v - peak) ** 2), 0.0, (1.0,), limits)
+    assert (climb.speed, climb.ended) == (peak, "peak")
+    beyond = hill_climb(lambda v: v * np.sign(peak), 0.0, (1.0,), limits)
+    assert beyond.path[-1] == limits[peak > 0]
+
+
 def test_never_asks_beyond_the_limits():
     def curve(v):
         assert -10 <= v <= 9

@@ -3,6 +3,7 @@
 import ast
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from navfilters.sar.raw.flight import Flight, view_of
 from navfilters.sar.raw.observation import centred_window, observe
 from navfilters.sar.raw.radar import PALSAR, Radar, Window, receive
 from navfilters.sar.raw.rasters import _facets, _lattice, _to_radar, scene_raster
-from navfilters.sar.raw.synthesis import Raster, synthesize
+from navfilters.sar.raw.synthesis import Raster, _span, synthesize
 from navfilters.space.frames import ecef_to_geodetic, geodetic_to_ecef
 
 
@@ -267,3 +268,17 @@ def test_echo_and_focus_share_nothing():
         ("navfilters.numerics", "validation"),
         ("navfilters.types", "Array"),
     }
+
+
+def test_the_span_of_what_scatters_is_that_of_both(small):
+    """Lines and cells by hand: a raster from line -7 and cell 3, two points about it."""
+    window = Window(2.0, 100, 200, 8e5)
+    raster = SimpleNamespace(amplitude=np.zeros((20, 50)), line=-7, cell=3)
+    time = 2.0 + np.array([-10.5, 30.5]) / small.prf
+    slant = 8e5 + np.array([60.5, 4.5]) * small.range_spacing
+    points = Echoes(time, slant, np.zeros(2), np.ones(2))
+    assert _span(small, window, None, raster) == ((-7, 13), (3, 53))
+    assert _span(small, window, points, None) == ((-11, 31), (4, 61))
+    assert _span(small, window, points, raster) == ((-11, 31), (3, 61))
+    with pytest.raises(ValueError, match="must hold scatterers"):
+        _span(small, window, None, None)

@@ -135,11 +135,21 @@ def test_a_void_beside_the_square_is_felt(tmp_path):
             assert_allclose(found.posts, clean.posts, rtol=0, atol=1e-6)
 
 
+def test_a_geoid_lifts_the_median_as_it_lifts_the_posts(tmp_path):
+    path = dem(tmp_path / "a.tif", hills())
+    for geoid in (-27.0, 45.5):
+        apart = median_height(path, PLACE, 2000.0, geoid=geoid) - median_height(path, PLACE, 2000.0)
+        assert apart == pytest.approx(geoid, abs=1e-9)
+        posts = (read_terrain(path, PLACE, 2000.0, geoid=g).posts for g in (geoid, 0.0))
+        assert_allclose(next(posts) - next(posts), geoid, rtol=1e-9)
+
+
 def test_heights_in_feet(tmp_path):
     """Declared, they are turned into metres; undeclared, high ones are refused."""
     metres = hills(level=3200.0)
     wanted = read_terrain(dem(tmp_path / "m.tif", metres), PLACE, 2000.0).posts
-    for k, unit in enumerate(("ft", "foot", "feet", "US survey foot")):
+    international = ("ft", "foot", "feet", "International foot")
+    for k, unit in enumerate((*international, "US survey foot", "ftUS", "us-ft", "foot_US")):
         path = dem(tmp_path / f"{k}.tif", metres / 0.3048, units=unit)
         assert_allclose(read_terrain(path, PLACE, 2000.0).posts, wanted, rtol=1e-5)
         assert_allclose(median_height(path, PLACE, 2000.0), np.median(wanted), rtol=1e-2)
@@ -150,7 +160,7 @@ def test_heights_in_feet(tmp_path):
         read_terrain(path, PLACE, 2000.0)
 
 
-@pytest.mark.parametrize("unit", ["m", "metre", "meters", ""])
+@pytest.mark.parametrize("unit", ["m", "metre", "metres", "meter", "meters", "unknown", ""])
 def test_metres_by_any_name(tmp_path, unit):
     posts = hills()
     path = dem(tmp_path / "a.tif", posts, units=unit)

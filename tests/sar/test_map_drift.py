@@ -23,11 +23,11 @@ def focuser(small, flight, hit):
 
 
 def test_known_shifts_are_found():
-    """Two lines in frequency, one of which was moved by whole and by half lines."""
+    """Two lines in frequency, one of which was moved by whole lines, and by parts of them."""
     rng, n = np.random.default_rng(0), 256
     f = np.fft.fftfreq(n)[:, None]
     spectrum = np.where(np.abs(f) < 0.4, 1.0, 0.0) * np.exp(2j * np.pi * f * 100)
-    for lines in (-7.0, 0.0, 3.5):
+    for lines in (-7.0, 0.0, 3.5, 2.05, -4.93):
         moved = spectrum * np.where(f > 0, np.exp(-2j * np.pi * f * lines), 1.0)
         pixels = np.fft.ifft(moved * rng.uniform(1, 2, (1, 16)), axis=0)
         found = look_drift(Image(pixels, 0.0, 2000.0, 8e5, 5.0))

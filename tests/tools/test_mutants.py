@@ -1,10 +1,13 @@
 """The mutation tool on planted code: which edits it makes, and which of them tests see."""
 
 import ast
+from copy import copy
 
-import mutants
+import mutant_order
 import pytest
-from mutants import Mutant, Sites, sample, seen, tiers
+from mutant_order import Suite, measure, statement, tiers
+from mutant_sites import Mutant, Sites, sample
+from mutants import explained, failing, first_failure, seen, summary
 
 PLANTED = '''"""Text 1 + 1."""
 
@@ -22,11 +25,45 @@ TESTS = """from navfilters.small.planted import larger
 def test_it():
     assert larger(1, 2) == 5
 """
+ELSE = """import time
+
+import pytest
+from navfilters.small.planted import larger
 
 
-@pytest.fixture
-def tree(tmp_path):
-    library, tests = tmp_path / "lib/navfilters", tmp_path / "tests/small"
+def test_bad():
+    assert larger(1, 2) == 0
+
+
+def test_other():
+    pass
+
+
+@pytest.mark.parametrize("b", [2], ids=["of - two"])
+def test_larger(b):
+    time.sleep(0.1)
+    assert larger(-1, b) == 2
+"""
+FIXTURE = """import pytest
+from navfilters.small.planted import larger
+
+
+@pytest.fixture(scope="module")
+def found():
+    return larger(1, 2)
+
+
+def test_one(found):
+    pass
+
+
+def test_two(found):
+    pass
+"""
+
+
+def plant(root):
+    library, tests = root / "lib/navfilters", root / "tests/small"
     for folder in (library / "small", library / "oracles", tests):
         folder.mkdir(parents=True)
     for package in (library, library / "small", library / "oracles"):
@@ -35,8 +72,26 @@ def tree(tmp_path):
     (library / "oracles/second.py").write_text(PLANTED)
     (library / "small/user.py").write_text(f"import navfilters.small.planted\n\n\n{UNSEEN}")
     (tests / "test_planted.py").write_text(TESTS)
-    mutants.imports.cache_clear()
-    return tmp_path
+    (root / "pyproject.toml").write_text('[tool.pytest.ini_options]\nmarkers = ["slow: "]\n')
+    return root
+
+
+@pytest.fixture
+def tree(tmp_path):
+    mutant_order.imports.cache_clear()
+    return plant(tmp_path)
+
+
+def measured(root, file, tests):
+    (root / "tests/small" / file).write_text(tests)
+    measure(root, root / "measured")
+    return Suite(root / "measured")
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory):
+    """Four tests of the planted code, of which one fails."""
+    return measured(plant(tmp_path_factory.mktemp("suite")), "test_else.py", ELSE)
 
 
 def edits(source):
@@ -105,13 +160,99 @@ def test_tests_that_mirror_a_file_come_first(tree):
     assert far == ["tests/test_far.py"]
 
 
+def planted(old, new):
+    start = PLANTED.index(old, PLANTED.index("if") if old != "1 + 1" else 0)
+    line = PLANTED.count("\n", 0, start) + 1
+    return Mutant("lib/navfilters/small/planted.py", line, "", start, start + len(old), old, new)
+
+
+def test_the_tests_that_run_a_line_are_known_and_their_time(tree, suite):
+    file, it = "lib/navfilters/small/planted.py", "tests/small/test_planted.py::test_it"
+    slower = "tests/small/test_else.py::test_larger[of - two]"
+    other = "tests/small/test_else.py::test_other"
+    assert list(suite.seconds) == [other, slower, it]
+    assert suite.seconds[slower] >= 0.1 > suite.seconds[it]
+    assert suite.running(file, [7]) == [it]
+    assert suite.running(file, [8]) == [slower]
+    assert suite.running(file, [6]) == [it, slower]
+    assert suite.running(file, [4]) == []
+    (tree / "tests/small/test_else.py").write_text(ELSE)
+    assert suite.order(tree, planted("max", "min")) == [slower, it, other]
+    more = copy(suite)
+    more.seconds = {"tests/test_of_all.py::test_it": 0.0, **suite.seconds}
+    assert more.order(tree, planted("max", "min"))[3:] == ["tests/test_of_all.py::test_it"]
+
+
+def test_all_tests_of_a_file_use_what_its_fixture_runs(tree):
+    suite = measured(tree, "test_planted.py", FIXTURE)
+    tests = suite.running("lib/navfilters/small/planted.py", [7])
+    assert set(tests) == {f"tests/small/test_planted.py::test_{name}" for name in ("one", "two")}
+
+
 @pytest.mark.parametrize(
-    ("old", "new", "by"),
-    [("+", "-", "tests/small/test_planted.py::test_it"), (">", ">=", "")],
+    ("source", "line", "lines"),
+    [
+        ("a = 1\nb = (\n    2,\n    3,\n)\n", 3, range(2, 6)),
+        ("if a:\n    b = 1\n", 1, range(1, 2)),
+        ("if a:\n    b = 1\n", 2, range(2, 3)),
+        ("def f(\n    a=1,\n):\n    b = 1\n", 2, range(1, 4)),
+        ("for a in b: c()\n", 1, range(1, 2)),
+        ("@f(\n    1,\n)\ndef g():\n    pass\n", 2, range(2, 3)),
+    ],
 )
-def test_what_tests_see_and_what_survives(tree, old, new, by):
-    (tree / "pyproject.toml").write_text('[tool.pytest.ini_options]\nmarkers = ["slow: "]\n')
-    start = PLANTED.index(old, PLANTED.index("if"))
-    mutant = Mutant("lib/navfilters/small/planted.py", 0, "", start, start + 1, old, new)
-    assert seen(tree, mutant, 60)[0] == by
+def test_the_statement_of_a_line(source, line, lines):
+    assert statement(source.encode(), line) == lines
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "limit", "by"),
+    [
+        ("+", "-", 60, "tests/small/test_planted.py::test_it"),
+        ("max", "min", 60, "tests/small/test_else.py::test_larger[of - two]"),
+        ("max", "min", 0.05, ""),
+        (">", ">=", 60, ""),
+    ],
+)
+def test_what_tests_see_and_what_survives(tree, suite, old, new, limit, by):
+    mutant = planted(old, new)
+    (tree / "tests/small/test_else.py").write_text(ELSE)
+    assert seen(tree, mutant, suite, limit)[0] == by
     assert (tree / mutant.file).read_text() == PLANTED
+
+
+def test_a_pytest_that_cannot_begin_sees_nothing(tree, suite):
+    (tree / "conftest.py").write_text("import nothing\n")
+    with pytest.raises(SystemExit, match="cannot begin"):
+        seen(tree, planted("+", "-"), suite, 60)
+    assert (tree / "lib/navfilters/small/planted.py").read_text() == PLANTED
+
+
+def test_files_run_where_a_test_has_lost_its_name(tree):
+    file = tree / "tests/small/test_planted.py"
+    names = [f"tests/small/test_planted.py::test_{name}" for name in ("it", "gone")]
+    file.write_text(TESTS.replace("5", "6"))
+    assert first_failure(tree, names, 60) == names[0]
+    file.write_text(TESTS.replace("import larger", "import smaller"))
+    assert first_failure(tree, names, 60) == "tests/small/test_planted.py"
+
+
+def test_a_test_that_fails_without_a_mutant_sees_none(tree):
+    (tree / "tests/small/test_else.py").write_text(ELSE)
+    bad, good = "tests/small/test_else.py::test_bad", "tests/small/test_planted.py::test_it"
+    assert failing(tree, {bad, good}) == {bad}
+
+
+def test_what_no_test_is_meant_to_see_has_a_row(tree):
+    said = "| `small/planted.py` | `return a + 2 * b` | `return a - 2 * b` | Text. |"
+    assert explained(tree, planted("+", "-"), said)
+    assert not explained(tree, planted("*", "/"), said)
+    assert not explained(tree, planted("+", "-"), said.replace("planted", "user"))
+
+
+def test_the_report_counts_apart():
+    names = [("t::a", 1), ("t::b", 2), ("", 1), ("stopped", 1), ("explained", 1)]
+    rows = [{"seen_by": by, "tries": tries} for by, tries in names]
+    report = summary(1, [*rows, {"line": 1}])
+    counts = {"seen": 2, "survived": 1, "stopped": 1, "explained": 1, "doubtful": 0}
+    expected = {"seed": 1, "count": 5, "seen_at_first": 1, **counts, "per_cent_seen": 50.0}
+    assert report == {**expected, "mutants": rows}

@@ -1,11 +1,13 @@
 """The batch solution on a flight that is made up, where the truth is known."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from navfilters.tracking import DRAG, LEAK_RATE, MOTION, flight, solve
+from navfilters.tracking.w3b import FOLDER
 
 TIMES = 40  # measurements of the made-up flight
 
@@ -95,3 +97,17 @@ def test_too_few_iterations_are_an_error(problem):
     made, truth = problem
     with pytest.raises(ArithmeticError, match="not converged in 1 iterations"):
         solve(made, truth + 1e5 * np.eye(made.size)[0], free=free_of(made), iterations=1)
+
+
+def test_the_start_is_what_the_settings_say():
+    """Read anew: drag of 2.0 on 13.12 m^2 and 5370 kg; the sites' biases in metres and radians."""
+    real = flight(degree=2)
+    text = (FOLDER / "od_test_W3.in").read_text(encoding="utf-8")
+    said = dict(re.findall(r"^([\w.\[\]]+) *= *(\S+)", text, re.M))
+    assert real.start[DRAG] == pytest.approx(2.0 * 13.12 / 5370.0, rel=1e-12)
+    assert (said["drag.cd"], said["drag.area"]) == ("2.0", "13.12")
+    assert "mass = 5370.0" in text
+    radius = np.hypot.reduce([float(said[f"orbit.cartesian.{c}"]) for c in ("px", "py", "pz")])
+    assert np.linalg.norm(real.start[:3]) == pytest.approx(radius, rel=1e-12)
+    speed = np.hypot.reduce([float(said[f"orbit.cartesian.{c}"]) for c in ("vx", "vy", "vz")])
+    assert np.linalg.norm(real.start[3:6]) == pytest.approx(speed, rel=1e-12)

@@ -144,6 +144,15 @@ REFUSED = {
 }
 
 
+def test_a_burn_may_last_from_the_first_second_to_the_last():
+    """Thrust is along the velocity, and its work what the energy gains; J2 adds a thousandth."""
+    flown = truth(replace(SHORT, burns=((0, 2000),)))
+    assert flown.thrust.magnitude == 0.45
+    r, v = (np.linalg.norm(flown.states[:, part], axis=1) for part in (slice(3), slice(3, 6)))
+    energy = v**2 / 2 - EARTH.mu / r
+    assert_allclose(energy[-1] - energy[0], 0.45 * np.trapezoid(v), rtol=1e-2)
+
+
 @pytest.mark.parametrize(("call", "message"), REFUSED.values(), ids=REFUSED)
 def test_bad_input_is_refused_by_name(call, message):
     with pytest.raises(ValueError, match=message):
