@@ -3,15 +3,15 @@
 from typing import Any
 
 LONGEST = (
-    "limits",
-    "navigation",
-    "w3b-filters",
-    "remedies",
-    "closed-loop",
     "sar-imaging",
+    "closed-loop",
     "fair-comparisons",
     "autofocus-rivals",
+    "navigation",
+    "limits",
     "geolocation",
+    "sensitivity",
+    "without-antenna",
 )
 """Of all chapters these took longest, in this order; to be measured again when that changes."""
 
