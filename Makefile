@@ -88,7 +88,7 @@ spread: $(VENV)/.test  ## how far each claim moves with last bits and processors
 	$(BIN)/python tools/spread.py --store
 
 pages: $(VENV)/.test $(BUILT)  ## the ledger, the stored notebooks, and the built pages in a browser
-	$(BIN)/pytest tests/book -n 3 --dist loadgroup -m "not alone"
+	$(BIN)/pytest tests/book -n 2 --dist loadscope -m "not alone"
 	$(BIN)/pytest tests/book -m alone
 
 notebooks: $(VENV)/.test  ## execute every notebook in place and refresh its stored outputs
