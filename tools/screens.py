@@ -12,20 +12,17 @@ THEMES = ("light", "dark")
 TALLEST = 4000
 
 
-def pieces(height: int) -> list[tuple[int, int]]:
-    """Top and height of each piece."""
-    return [(top, min(TALLEST, height - top)) for top in range(0, height, TALLEST)]
-
-
 def shoot(page: Page, width: int, out: Path, stem: str) -> None:
-    """The full page, cut where it is too tall."""
-    parts = pieces(page.evaluate("document.documentElement.scrollHeight"))
-    for number, (top, height) in enumerate(parts, 1):
+    """The full page, cut where it is too tall; each cut may change its height a little."""
+    top, number = 0, 0
+    while (height := page.evaluate("document.documentElement.scrollHeight") - top) > 0:
+        number += 1
         page.screenshot(
-            path=out / f"{stem}{f'-{number}' if len(parts) > 1 else ''}.png",
+            path=out / f"{stem}-{number}.png",
             full_page=True,
-            clip={"x": 0, "y": top, "width": width, "height": height},
+            clip={"x": 0, "y": top, "width": width, "height": min(TALLEST, height)},
         )
+        top += TALLEST
 
 
 def shoot_all(pages: Site, out: Path) -> None:
