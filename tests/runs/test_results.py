@@ -110,7 +110,7 @@ def test_an_interruption_gives_no_result(monkeypatch):
 def empty():
     """A cluster whose workers have not come."""
     options = {"n_workers": 0, "threads_per_worker": 1, "processes": False}
-    with LocalCluster(**options, dashboard_address=None) as cluster, Client(cluster) as client:
+    with LocalCluster(**options, dashboard_address=":0") as cluster, Client(cluster) as client:
         yield client
 
 
