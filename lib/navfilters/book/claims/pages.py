@@ -149,7 +149,7 @@ def rules() -> Page:
         )
         lines.append(f"{name.partition(':')[0]}: {same} and {len(others)} others")
     head = ("word", "rule", "claims", "others")
-    return Page(table("claims-listing", head, rows), "\n".join(lines))
+    return Page(table("claims-listing claims-rules", head, rows), "\n".join(lines))
 
 
 def _at(claim: Claim) -> str:
