@@ -173,7 +173,7 @@ def _of_noises(size: int) -> tuple[Array, Array]:
 
 
 class Maps(NamedTuple):
-    """I of one filter.
+    """I of Eq. (27), a ratio without unit, of one filter.
 
     Parameters
     ----------
