@@ -76,7 +76,9 @@ lint: $(VENV)/.test  ## ruff over code and notebooks, mypy and the layers of imp
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# Two notebooks at a time, so that BLAS has one core each; without AVX-512 it has its threads.
+# Two notebooks at a time, so that BLAS has one core each. Elsewhere it has its threads, which sleep when
+# they wait: they would take the other notebook's core.
+$(BUILT) elsewhere: export OPENBLAS_THREAD_TIMEOUT := 4
 nbval: $(VENV)/.test  ## run every notebook and compare with its stored outputs
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH="$(CURDIR)/tools" $(BIN)/pytest book --nbval --nbval-current-env -n 2 --dist loadscope \
 		--no-loadscope-reorder -p no:cacheprovider -p longest_first -p keep_executed

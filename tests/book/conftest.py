@@ -10,6 +10,7 @@ import pytest
 from xdist.scheduler import LoadScopeScheduling
 
 PAGES = set(chromium.toc())
+DRAWN = "() => new Promise(drawn => requestAnimationFrame(() => requestAnimationFrame(drawn)))"
 OPEN = """document.querySelectorAll('.bd-article details').forEach(fold => { fold.open = true; })"""
 
 
@@ -51,19 +52,30 @@ def browser(html):
 
 
 @pytest.fixture(scope="session", params=chromium.toc())
-def wide(browser, request):
+def loaded(browser, request):
     """A page of the table of contents, loaded as on a first visit, with its folds open."""
     with browser.visit(request.param) as visit:
         visit.page.evaluate(OPEN)
         yield visit
 
 
-@pytest.fixture(scope="session", params=chromium.toc())
-def narrow(browser, request):
-    """The same on a telephone."""
-    with browser.visit(request.param, width=390) as visit:
-        visit.page.evaluate(OPEN)
-        yield visit
+def _as_wide_as(visit, width):
+    if visit.page.viewport_size["width"] != width:
+        visit.page.set_viewport_size({"width": width, "height": 900})
+        visit.page.evaluate(DRAWN)
+    return visit
+
+
+@pytest.fixture
+def wide(loaded):
+    """A page on a wide screen."""
+    return _as_wide_as(loaded, 1280)
+
+
+@pytest.fixture
+def narrow(loaded):
+    """The same page on a telephone's: no script looks at the width while a page loads."""
+    return _as_wide_as(loaded, 390)
 
 
 class ByPage(LoadScopeScheduling):
