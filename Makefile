@@ -13,6 +13,7 @@ SOURCES := $(shell find book lib -type f -not -path '*/__pycache__/*' -not -name
 # Everything runs in .venv, with .venv's settings: what the shell has of packages (ROS sets PYTHONPATH),
 # start-up files, kernels named python3, styles and pip options stays outside.
 unexport PYTHONPATH PYTHONHOME PYTHONSTARTUP PYTHONOPTIMIZE PYTHONWARNINGS PYTHONSAFEPATH PYTHONINSPECT
+unexport PYTHONDONTWRITEBYTECODE PYTHONPYCACHEPREFIX
 unexport JUPYTER_CONFIG_PATH MATPLOTLIBRC MPLBACKEND PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT
 export PYTHONNOUSERSITE := 1
 export PYTHONUTF8 := 1

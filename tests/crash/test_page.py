@@ -24,8 +24,13 @@ def report():
     return crash_test(FILTERS["B-EKF 1"], checks, name="mine", progress=False)
 
 
-def test_every_picture_is_in_the_page(report):
-    soup = BeautifulSoup(report.html(), "html.parser")
+@pytest.fixture(scope="module")
+def page(report):
+    return report.html()
+
+
+def test_every_picture_is_in_the_page(page):
+    soup = BeautifulSoup(page, "html.parser")
     pictures = {s.h2.contents[0].strip(): s.find_all("img") for s in soup.find_all("section")}
     assert {name: len(found) for name, found in pictures.items()} == {
         "jump": 0,
@@ -42,8 +47,8 @@ def test_every_picture_is_in_the_page(report):
     assert not soup.find_all(["script", "link", "a"])
 
 
-def test_the_page_is_the_same_twice(report):
-    assert report.html() == report.html()
+def test_the_page_is_the_same_twice(report, page):
+    assert report.html() == page
 
 
 def test_without_matplotlib_one_line_says_so(report, monkeypatch):

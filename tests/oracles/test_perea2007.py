@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from untraced import untraced
 
 from navfilters import SigmaPoints, first_indefinite, run
 from navfilters.models import RangeBearing
@@ -33,6 +34,7 @@ every_form = pytest.mark.parametrize("form", ["short", "joseph"])
 
 
 @cache  # both forms of a filter are the same one
+@untraced()
 def exact(name, setup, keep=tuple(STEPS), **options):
     """The oracle's entries from the same floats, but for z, which it computes from x_true."""
     R = (setup.range_variance, setup.bearing_variance)

@@ -27,14 +27,19 @@ from navfilters.problems import (
 )
 from navfilters.problems.table import settled
 
-FULL = problems(full=True)
 BY_NAME = {cure.name: cure for cure in CURES}
 STORED = read()
 
 
-def test_every_pair_is_stored_in_order():
+@pytest.fixture(scope="module")
+def full():
+    """The patients of the stored table; the satellite's takes seconds to solve."""
+    return problems(full=True)
+
+
+def test_every_pair_is_stored_in_order(full):
     pairs = list(own(STORED))
-    assert pairs == [(patient, cure.name) for patient in FULL for cure in CURES]
+    assert pairs == [(patient, cure.name) for patient in full for cure in CURES]
 
 
 def test_a_pair_has_either_numbers_or_a_reason():
@@ -52,16 +57,16 @@ def test_a_pair_has_either_numbers_or_a_reason():
         ("fix, noisy", "polar"),
     ],
 )
-def test_the_stored_table_is_what_the_library_computes(patient, cure):
-    fresh = cells(FULL[patient], BY_NAME[cure], stored.RUNS, scan=False)[0]
+def test_the_stored_table_is_what_the_library_computes(patient, cure, full):
+    fresh = cells(full[patient], BY_NAME[cure], stored.RUNS, scan=False)[0]
     kept = own(STORED)[patient, cure]
     for name in ("ratio", "median", "lost", "honesty", "nis", "covered"):
         assert getattr(fresh, name) == pytest.approx(getattr(kept, name), rel=1e-3)
     assert (fresh.honest, fresh.evaluations) == (kept.honest, kept.evaluations)
 
 
-def test_a_table_is_read_as_it_was_written(tmp_path):
-    three = {"three images": FULL["three images"]}
+def test_a_table_is_read_as_it_was_written(tmp_path, full):
+    three = {"three images": full["three images"]}
     found = table(3, patients=three, cures=[BY_NAME["AREKF"], BY_NAME["B-EKF 3"]])
     stored.write(tmp_path / "table.csv", found)
     again = read(tmp_path / "table.csv")
@@ -70,13 +75,13 @@ def test_a_table_is_read_as_it_was_written(tmp_path):
     assert again[-1].reason.startswith("needs a square H")
 
 
-def test_only_what_is_lost_is_decided_by_rounding():
+def test_only_what_is_lost_is_decided_by_rounding(full):
     """Where a filter works, the last bits of its first estimate do not matter."""
     assert min(cell.lost for cell in STORED if not cell.settled) > 0.1
     shown = [cell for row in rows(STORED) for cell in row.cells if not cell.settled]
     assert min(cell.lost for cell in shown) > 0.5
     first = own(STORED)
-    assert all(first[patient, "EKF"].settled for patient in FULL)
+    assert all(first[patient, "EKF"].settled for patient in full)
 
 
 class Chaotic:
@@ -150,8 +155,8 @@ def test_elsewhere_is_the_same_value_or_the_reason_why_not():
 
 
 @pytest.mark.slow
-def test_processes_compute_what_one_does():
-    one = {"three images": FULL["three images"]}
+def test_processes_compute_what_one_does(full):
+    one = {"three images": full["three images"]}
     few = [BY_NAME[name] for name in ("EKF", "B-EKF 1", "UKF", "AREKF", "gate")]
     alone = table(3, patients=one, cures=few)
     assert table(3, patients=one, cures=few, workers=2) == alone

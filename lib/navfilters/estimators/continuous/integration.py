@@ -5,8 +5,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import scipy.integrate
-from scipy.integrate import solve_ivp
 
 from navfilters.estimators.continuous.system import ContinuousSystem, Signal
 from navfilters.numerics import validation
@@ -98,6 +96,8 @@ def integrate(
                 f"atol (now {rtol:g} and {atol:g}), or try method='Radau' or a less vague prior"
             )
 
+    from scipy.integrate import solve_ivp  # as long to import as the rest of the library
+
     first = np.concatenate([start.mean, start.cov[upper]])
     # Time counts from the start: near zero a float has room for the first steps of a vague prior.
     with np.errstate(all="ignore"):  # a state that overflows stops the integrator, reported below
@@ -158,6 +158,8 @@ def _smallest_deviations(
 
 def _following(method: Any, tolerance: Callable[..., Any]) -> Any:
     """The integrator of SciPy with an absolute tolerance that follows the state."""
+    import scipy.integrate
+
     base: Any = getattr(scipy.integrate, method, None) if isinstance(method, str) else method
     if not (isinstance(base, type) and issubclass(base, scipy.integrate.OdeSolver)):
         return method  # for SciPy to refuse
