@@ -86,11 +86,12 @@ class GatedInflation(Rule):
         """lambda P where the gate is open."""
         assert y is not None
         assert moments is not None
-        from scipy import stats  # it takes longer to import than the rest of the library
+        from scipy.special import gammaincinv  # filters need no SciPy to be imported
 
         xp, m = y.__array_namespace__(), y.shape[-1]
         spread = matmul(sensed(prior, moments)[0], moments.P_xz)
-        opened = _solved(moments.P_zz, y)[1] > stats.chi2.ppf(self.probability, m)
+        limit = 2 * gammaincinv(m / 2, self.probability)  # of chi-square
+        opened = _solved(moments.P_zz, y)[1] > limit
         bound = xp.asarray(self.largest)
         if self.factor is None:
             factor = _to_expectation(y, moments.P_zz, spread, bound)
