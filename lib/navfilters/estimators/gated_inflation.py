@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from navfilters.estimators.rule import Rule, sensed, zeros
 from navfilters.numerics import validation
+from navfilters.numerics.chi_square import quantile
 from navfilters.numerics.small_matrices import matmul, right_divide
 from navfilters.types import Array, Gaussian, Moments
 
@@ -86,12 +87,9 @@ class GatedInflation(Rule):
         """lambda P where the gate is open."""
         assert y is not None
         assert moments is not None
-        from scipy.special import gammaincinv  # filters need no SciPy to be imported
-
         xp, m = y.__array_namespace__(), y.shape[-1]
         spread = matmul(sensed(prior, moments)[0], moments.P_xz)
-        limit = 2 * gammaincinv(m / 2, self.probability)  # of chi-square
-        opened = _solved(moments.P_zz, y)[1] > limit
+        opened = _solved(moments.P_zz, y)[1] > quantile(self.probability, m)
         bound = xp.asarray(self.largest)
         if self.factor is None:
             factor = _to_expectation(y, moments.P_zz, spread, bound)
