@@ -51,6 +51,12 @@ def test_blocks_make_up_all_lines():
     assert_array_equal(done, 1)
 
 
+@pytest.mark.parametrize("threads", ["1", "2"])
+def test_results_come_in_the_order_of_the_parts(monkeypatch, threads):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", threads)
+    assert in_threads(lambda k: k * k, range(50)) == [k * k for k in range(50)]
+
+
 def test_errors_leave_the_threads():
     def work(lines):
         raise ZeroDivisionError("in a thread")

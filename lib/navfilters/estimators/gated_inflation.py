@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 from navfilters.estimators.rule import Rule, sensed, zeros
 from navfilters.numerics import validation
+from navfilters.numerics.chi_square import quantile
+from navfilters.numerics.loops import is_jax
 from navfilters.numerics.small_matrices import matmul, right_divide
 from navfilters.types import Array, Gaussian, Moments
 
@@ -86,14 +88,13 @@ class GatedInflation(Rule):
         """lambda P where the gate is open."""
         assert y is not None
         assert moments is not None
-        from scipy import stats  # it takes longer to import than the rest of the library
-
         xp, m = y.__array_namespace__(), y.shape[-1]
         spread = matmul(sensed(prior, moments)[0], moments.P_xz)
-        opened = _solved(moments.P_zz, y)[1] > stats.chi2.ppf(self.probability, m)
+        opened = _solved(moments.P_zz, y)[1] > quantile(self.probability, m)
         bound = xp.asarray(self.largest)
         if self.factor is None:
-            factor = _to_expectation(y, moments.P_zz, spread, bound)
+            steps = NEWTON_STEPS if is_jax(xp) or opened.any() else 0  # none for closed gates
+            factor = _to_expectation(y, moments.P_zz, spread, bound, steps)
         else:
             factor = xp.minimum(xp.asarray(self.factor), bound)
         factor = xp.where(opened, factor, 1.0)
@@ -107,15 +108,15 @@ def _solved(S: Array, y: Array) -> tuple[Array, Array]:
     return u, u.__array_namespace__().sum(u * y, axis=-1)
 
 
-def _to_expectation(y: Array, S: Array, spread: Array, bound: Array) -> Array:
+def _to_expectation(y: Array, S: Array, spread: Array, bound: Array, steps: int) -> Array:
     """The lambda with y^T (S + (lambda - 1) spread)^-1 y = m, where that is above 1.
 
     Newton's method on the inverse of the square, which is concave in lambda: from 1 it comes
     nearer with each step and never beyond.
     """
     xp, m = y.__array_namespace__(), y.shape[-1]
-    factor = 1.0 + 0 * y[..., 0]
-    for _ in range(NEWTON_STEPS):
+    factor = xp.minimum(1.0 + 0 * y[..., 0], bound)
+    for _ in range(steps):
         u, square = _solved(S + (factor - 1)[..., None, None] * spread, y)
         slope = xp.sum(u * matmul(spread, u[..., None])[..., 0], axis=-1)
         slope = xp.where(slope > 0, slope, xp.inf)  # where P is not sensed there is no factor

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from navfilters.numerics import validation
+from navfilters.numerics.chi_square import quantile
 
 
 def chi_square_band(dof: int, runs: Any = 1, confidence: float = 0.95) -> tuple[Any, Any]:
@@ -34,9 +35,7 @@ def chi_square_band(dof: int, runs: Any = 1, confidence: float = 0.95) -> tuple[
     if one < 1 or np.any(many < 1):
         raise ValueError(f"dof and runs must be at least 1; found {dof} and {np.min(runs)}")
     total = one * many
-    from scipy import stats  # it takes longer to import than the rest of the library
-
-    return tuple(stats.chi2.ppf(p, total) / many for p in (tail, 1 - tail))
+    return tuple(quantile(p, total) / many for p in (tail, 1 - tail))
 
 
 def tail_of(confidence: float) -> float:

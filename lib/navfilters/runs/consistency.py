@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from navfilters.numerics import validation
+from navfilters.numerics.chi_square import quantile
 from navfilters.numerics.small_matrices import cholesky, whitened_square
 from navfilters.runs.chi_square import chi_square_band, tail_of
 
@@ -166,9 +167,7 @@ def sample_deviation(
     mean = np.sum(np.where(keep, error, 0.0), axis=0) / k
     sample = np.sqrt(np.sum(np.where(keep, error - mean, 0.0) ** 2, axis=0) / (k - 1))
     variance = np.where(keep, np.diagonal(cov, axis1=-2, axis2=-1), 0.0)
-    from scipy import stats
-
-    low, high = (sample * np.sqrt((k - 1) / stats.chi2.ppf(p, k - 1)) for p in (1 - tail, tail))
+    low, high = (sample * np.sqrt((k - 1) / quantile(p, k - 1)) for p in (1 - tail, tail))
     return SampleDeviation(mean, sample, low, high, np.sqrt(np.sum(variance, axis=0) / k), runs)
 
 

@@ -1,8 +1,12 @@
 """Work in parts, which fit the cache and go to two threads."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+Part = TypeVar("Part")
+Result = TypeVar("Result")
 
 
 def blocks(n: int, most: int) -> list[slice]:
@@ -19,7 +23,7 @@ def blocks(n: int, most: int) -> list[slice]:
     return [slice(i, min(i + most, n)) for i in range(0, n, most)]
 
 
-def in_threads(work: Callable[[slice], None], parts: list[slice]) -> None:
+def in_threads(work: Callable[[Part], Result], parts: Iterable[Part]) -> list[Result]:
     """Do all parts of some work, of which none writes what another does.
 
     Where ``OPENBLAS_NUM_THREADS`` is 1, there is a process for each core, and no second thread.
@@ -27,12 +31,15 @@ def in_threads(work: Callable[[slice], None], parts: list[slice]) -> None:
     Parameters
     ----------
     work : callable
-    parts : list of slice
+    parts : iterable
+        Slices of an array; or whole images, which have parts of their own.
+
+    Returns
+    -------
+    list
+        What the work returns of each.
     """
     if os.environ.get("OPENBLAS_NUM_THREADS") == "1":
-        for part in parts:
-            work(part)
-        return
+        return [work(part) for part in parts]
     with ThreadPoolExecutor(2) as pool:
-        for _ in pool.map(work, parts):
-            pass  # here an error in a thread is raised
+        return list(pool.map(work, parts))  # here an error in a thread is raised

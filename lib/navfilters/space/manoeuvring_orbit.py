@@ -189,8 +189,8 @@ class ManoeuvringOrbit:
     def _edges(self) -> Array:
         """Where the sub-steps of the interval begin, and its end."""
         end = self.start + self.interval
-        inside = [t for t in np.ravel(self.arcs) if self.start < t < end]
-        return np.unique([*np.arange(self.start, end, self.step), *inside, end])
+        inside = {t for arc in self.arcs for t in arc if self.start < t < end}
+        return np.array(sorted({*np.arange(self.start, end, self.step), *inside, end}))
 
     def _fires(self, t: float) -> bool:
         return any(first <= t < last for first, last in self.arcs)

@@ -123,6 +123,21 @@ def test_other_units_are_the_same_flight(scale):
         assert (np.abs(other - first)[..., :3].max() < 1e-4) == same
 
 
+def test_several_units_at_once_are_each_alone():
+    scales = np.repeat([(1.0, 1.0), (1e-3, 1e-3), (1e-3, 1.0)], 3, axis=1)
+    z = measurements(SHORT, range(2))
+
+    def flown(scale):
+        sensor, motion = (OtherUnits(x, scale) for x in (SHORT.sensor, manoeuvring(SHORT.orbit())))
+        rule = Robust(6000.0 * scale[..., 0])
+        first, told = sensor.prior(SHORT.prior), {"dynamics": motion, "z_per_step": True}
+        return run(replace(RIVALS["EKF"].filter, rule=rule), first, z, sensor, **told).mean
+
+    found = flown(scales[:, None])
+    for i, scale in enumerate(scales):
+        assert_allclose(found[:, i], flown(scale), rtol=1e-12)
+
+
 def test_the_command_prints_a_line_for_each_rival(capsys, monkeypatch):
     few = {name: RIVALS[name] for name in ("EKF", "timed Q")}
     monkeypatch.setattr("navfilters.papers.xiong2009.__main__.RIVALS", few)

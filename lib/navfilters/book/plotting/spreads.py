@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtrc
 
 from navfilters.book.plotting.curves import panels
 from navfilters.book.plotting.styles import BOUND, EKF, MEASUREMENT, SECOND_ORDER, TRUTH, UKF
+from navfilters.numerics.chi_square import quantile
 
 SPREADS: dict[str, dict[str, Any]] = {
     "predicted": {"color": MEASUREMENT, "linestyle": "-", "linewidth": 2.4},
@@ -98,12 +99,12 @@ def nees_tails(
     """
     figure, (ax,) = panels(1, 1, figsize=(7.0, 3.8))
     grid = np.linspace(0, 60, 200)
-    right = stats.chi2.sf(grid, dof)
+    right = chdtrc(dof, grid)
     ax.plot(grid, right, linestyle=":", color=TRUTH, label="chi-square")
     for name, each in values.items():
         fraction = 1 - np.arange(len(each)) / len(each)
         ax.step(np.sort(each), fraction, label=name, **styles[name])
-    ax.axvline(stats.chi2.ppf(0.99, dof), color=BOUND, linewidth=1)
+    ax.axvline(quantile(0.99, dof), color=BOUND, linewidth=1)
     ax.set(yscale="log", xlim=(0, 160), ylim=(1.5e-3, 1.2))
     ax.set(xlabel="NEES", ylabel="fraction above")
     ax.legend()

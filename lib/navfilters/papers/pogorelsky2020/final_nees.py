@@ -1,8 +1,8 @@
 """The NEES at the end of the runs of Pogorelsky et al., as numbers and in words."""
 
 import numpy as np
-from scipy import stats
 
+from navfilters.numerics.chi_square import quantile
 from navfilters.papers.pogorelsky2020.open_loop import MonteCarlo
 from navfilters.runs.consistency import nees
 from navfilters.types import Array
@@ -36,7 +36,7 @@ def nees_summary(values: Array, dof: int = 9) -> tuple[float, float, float, floa
     tuple of four floats
     """
     half = 1.96 * values.std() / np.sqrt(len(values))
-    above = 100 * np.mean(values > stats.chi2.ppf(0.99, dof))
+    above = 100 * np.mean(values > quantile(0.99, dof))
     return float(values.mean()), float(half), float(np.median(values)), float(above)
 
 

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from navfilters.types import Array, Gaussian
 
 
@@ -14,7 +16,7 @@ class OtherUnits:
     ----------
     inner : MeasurementModel or Dynamics
         In its own units.
-    scale : array (n,)
+    scale : array (..., n)
         Units of its state in one of the new ones: 1e-3 for metres to become kilometres.
     """
 
@@ -32,8 +34,10 @@ class OtherUnits:
 
     @property
     def R(self) -> Array:
-        """The sensor's."""
-        return self.inner.R
+        """The sensor's, of as many members as the scale has."""
+        R = self.inner.R
+        batch = np.broadcast_shapes(R.shape[:-2], self.scale.shape[:-1])
+        return np.broadcast_to(R, (*batch, *R.shape[-2:]))
 
     @property
     def Q(self) -> Array:
@@ -46,7 +50,7 @@ class OtherUnits:
 
     def jacobian(self, x: Array) -> Array:
         """H by the new state."""
-        return self.inner.jacobian(x / self.scale) / self.scale
+        return self.inner.jacobian(x / self.scale) / self.scale[..., None, :]
 
     def transition(self, x: Array) -> tuple[Array, Array]:
         """f(x) and F."""
@@ -54,9 +58,10 @@ class OtherUnits:
 
     def propagate(self, x: Array, Q: Array) -> tuple[Array, Array, Array]:
         """f(x), F and W."""
-        outer = self.scale[:, None] * self.scale
+        column, row = self.scale[..., :, None], self.scale[..., None, :]
+        outer = column * row
         x, F, W = self.inner.propagate(x / self.scale, Q / outer)
-        return self.scale * x, self.scale[:, None] * F / self.scale, outer * W
+        return self.scale * x, column * F / row, outer * W
 
     def _square(self, cov: Array) -> Array:
-        return self.scale[:, None] * cov * self.scale
+        return self.scale[..., :, None] * cov * self.scale[..., None, :]

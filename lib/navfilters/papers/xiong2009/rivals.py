@@ -10,7 +10,6 @@ from navfilters.estimators.filter import Filter
 from navfilters.estimators.gated_inflation import GatedInflation
 from navfilters.estimators.interacting import InteractingModels, Modes
 from navfilters.estimators.robust import AdaptiveRobust
-from navfilters.estimators.rule import Rule
 from navfilters.estimators.strong_tracking import StrongTracking
 from navfilters.papers.xiong2009.experiment import ESTIMATORS, Setup
 from navfilters.papers.xiong2009.monte_carlo import measurements
@@ -205,7 +204,7 @@ def fly_rivals(rivals: Mapping[Any, Rival], flights: Course, setup: Setup) -> di
     Parameters
     ----------
     rivals : mapping
-        Name to Rival, whose deviations are single numbers.
+        Name to Rival. One whose deviations are arrays flies alone.
     flights : Course
     setup : Setup
         As of ``fly_rival``.
@@ -217,8 +216,8 @@ def fly_rivals(rivals: Mapping[Any, Rival], flights: Course, setup: Setup) -> di
     """
     together, flown = dict[Any, list[Any]](), dict[Any, Flight]()
     for name, rival in rivals.items():
-        alone = not isinstance(rival.filter, Filter) or (rival.filter.rule or Rule()).parts
-        together.setdefault((rival[1:], name if alone else ""), []).append(name)
+        alone = not isinstance(rival.filter, Filter) or np.ndim(rival.q_v) or np.ndim(rival.q_a)
+        together.setdefault((name,) if alone else rival[1:], []).append(name)
     for names in together.values():
         filters = tuple(rivals[name].filter for name in names)
         flown |= zip(names, _fly(filters, rivals[names[0]], flights, setup), strict=True)

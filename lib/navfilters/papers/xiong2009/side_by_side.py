@@ -8,7 +8,8 @@ import numpy as np
 from navfilters.estimators import model_parts
 from navfilters.estimators.filter import Filter
 from navfilters.estimators.moments import linearized
-from navfilters.estimators.prediction import predict_linearized
+from navfilters.estimators.prediction import in_parts, predict_linearized
+from navfilters.estimators.rule import Rule
 from navfilters.estimators.state import FilterState
 from navfilters.types import Array, Gaussian
 
@@ -40,7 +41,7 @@ class SideBySide:
     Parameters
     ----------
     filters : tuple of Filter
-        With a linearised prediction; their rules may change Q, but not be told what it adds.
+        With a linearised prediction.
 
     Raises
     ------
@@ -52,15 +53,8 @@ class SideBySide:
 
     def __post_init__(self) -> None:
         for one in self.filters:
-            if (
-                not isinstance(one, Filter)
-                or one.moments is not linearized
-                or (one.rule is not None and one.rule.parts)
-            ):
-                raise ValueError(
-                    "filters must be of linearized moments, with rules that are not told what "
-                    f"noise adds; found {one!r}"
-                )
+            if not isinstance(one, Filter) or one.moments is not linearized:
+                raise ValueError(f"filters must be of linearized moments; found {one!r}")
 
     def init(self, prior: Gaussian) -> Flown:
         """The states before any step."""
@@ -69,19 +63,20 @@ class SideBySide:
     def predict(self, state: Flown, dynamics: Any, k: int = 0) -> Flown:
         """The states one transition later."""
         dynamics = model_parts.at(dynamics, k)
+        rules = [one.rule or Rule() for one in self.filters]
         told = [
-            (dynamics.Q, before.memory)
-            if one.rule is None
-            else one.rule.process_noise(before.memory, dynamics.Q)
-            for one, before in zip(self.filters, state.states, strict=True)
+            rule.process_noise(before.memory, dynamics.Q)
+            for rule, before in zip(rules, state.states, strict=True)
         ]
         means, covs = zip(*(before.estimate for before in state.states), strict=True)
         mean, cov, Q = _stacked((means, 1), (covs, 2), ([noise for noise, _ in told], 2))
-        after = predict_linearized(Gaussian(mean, cov), dynamics, Q)
+        after, W = in_parts(predict_linearized, Gaussian(mean, cov), dynamics, Q)
         return Flown(
             tuple(
-                before._replace(estimate=Gaussian(mean, cov), memory=memory)
-                for before, mean, cov, (_, memory) in zip(state.states, *after, told, strict=True)
+                before._replace(estimate=Gaussian(*one), memory=rule.noise_added(memory, added))
+                for before, rule, (_, memory), added, *one in zip(
+                    state.states, rules, told, W, *after, strict=True
+                )
             )
         )
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import fft
 
-from navfilters.sar.in_parts import blocks
+from navfilters.sar.in_parts import blocks, in_threads
 from navfilters.sar.raw.flight import Flight
 from navfilters.sar.raw.radar import LIGHT, Radar, Window
 from navfilters.types import Array
@@ -60,11 +60,14 @@ def point_echo(
     delay = np.arange(oversampling * window.ranges) / (oversampling * radar.sampling)
     carrier = pattern * np.exp(-4j * np.pi * distance / radar.wavelength)
     echo = np.empty((window.pulses, len(delay)), np.complex128)
-    for pulses in blocks(window.pulses, max(CACHED // len(delay), 1)):
+
+    def heard(pulses: slice) -> None:
         into = delay + 2 * (window.near_range - distance[pulses, None]) / LIGHT
         phase = np.pi * radar.chirp_rate * (into - radar.pulse_length / 2) ** 2
         inside = (into >= 0) & (into < radar.pulse_length)
         echo[pulses] = np.where(inside, _turned(phase), 0) * carrier[pulses, None]
+
+    in_threads(heard, blocks(window.pulses, max(CACHED // len(delay), 1)))
     return echo
 
 
