@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 from navfilters.papers.pogorelsky2020 import (
     CASES,
     NOMINAL,
+    BlockPlace,
     DifferentImages,
     Images,
     ImageTable,
@@ -30,6 +31,7 @@ from navfilters.papers.pogorelsky2020 import (
     truth,
     write_own,
 )
+from navfilters.papers.pogorelsky2020.image_blocks import _flight
 from navfilters.sar.images.autofocusing import hill_climb, sharpness
 from navfilters.sar.images.slant_image import Image
 from navfilters.sar.raw.radar import Radar
@@ -77,6 +79,15 @@ def test_the_criteria_see_the_truth_and_the_matches_find_it(acquired):
     assert_allclose(tables[1].sharpness, -curves.entropy[:, 1])
     assert_allclose(tables[1].r_f[0] - tables[1].truth, matches.error[1])
     assert tables[0].climb(acquired.speed + 40, (20.0, 5.0)).ended == "peak"
+
+
+def test_the_ground_passes_as_fast_as_the_place_of_a_block_says(acquired):
+    """The next 10 m along the flight are closest so much later."""
+    image = acquired.focuser.image(acquired.effective(acquired.speed), acquired.slope)
+    place = BlockPlace.of(acquired, image, cut_blocks(image, 512, 256)[0])
+    along = 10 * acquired.v / np.linalg.norm(acquired.v)
+    t, _ = _flight(acquired).closest(place.r_f + [0 * along, along])
+    assert_allclose(place.ground_speed, 10 / np.diff(t)[0], rtol=1e-4)
 
 
 def test_other_terrain_is_other_ground(acquired):
