@@ -2,6 +2,7 @@
 
 from contextlib import nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +21,8 @@ from navfilters.papers.pogorelsky2020 import (
     acquire,
     block_curves,
     block_tables,
+    campaign,
+    campaign_report,
     cut_blocks,
     fly_own_images,
     match_blocks,
@@ -203,6 +206,25 @@ def test_stored_sets_come_back(tmp_path):
     assert again.variance[0][0].climb(7400.0, (4.0,)) == found.variance[0][0].climb(7400.0, (4.0,))
     with pytest.raises(ValueError, match="found none"):
         read_own(tmp_path / "other.npz")
+
+
+def test_a_campaign_stores_each_image_of_a_direct_run_and_its_report(tmp_path, monkeypatch):
+    """Tables and images that cost nothing: a second call makes none."""
+    tables, made = [table(k, 0.5) for k in (1, 2, 3)], []
+
+    def measured(k, start, imaging):
+        made.append(k)
+        return tables[k - 1].climb(start, imaging.steps), SimpleNamespace(r_f=tables[k - 1].r_f[0])
+
+    monkeypatch.setattr(campaign, "_table", lambda store, k, done: tables[k - 1])
+    monkeypatch.setattr(campaign, "acquire", lambda setup, k, imaging: k)
+    monkeypatch.setattr(campaign, "measure_directly", measured)
+    found = campaign.run_campaign(tmp_path, 3, 2, imaging=SMALL)
+    assert made == [1, 1, 2, 2, 3, 3]
+    assert (tmp_path / "summary.txt").read_text() == campaign_report(found)
+    again = campaign.run_campaign(tmp_path, 3, 2, imaging=SMALL)
+    assert made == [1, 1, 2, 2, 3, 3]
+    assert campaign_report(again) == campaign_report(found)
 
 
 @pytest.mark.slow

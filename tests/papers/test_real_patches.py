@@ -24,7 +24,7 @@ from palsar_scene import (
 from navfilters.papers.pogorelsky2020 import CASES, Setup
 from navfilters.papers.pogorelsky2020.real_flight import first_lines, fitted, flight_through
 from navfilters.papers.pogorelsky2020.real_loop import run_filter
-from navfilters.papers.pogorelsky2020.real_patches import cut_patches
+from navfilters.papers.pogorelsky2020.real_patches import Patch, cut_patches
 from navfilters.sar.palsar.opening import open_product
 from navfilters.sar.palsar.orbit_and_pulse import StateVectors
 from navfilters.sar.palsar.product import Product
@@ -34,7 +34,7 @@ from navfilters.sar.raw.observation import _bright
 from navfilters.sar.raw.radar import Window
 from navfilters.sar.raw.rasters import scene_raster
 from navfilters.sar.raw.synthesis import synthesize
-from navfilters.space.frames import ecef_to_geodetic
+from navfilters.space.frames import antenna_axes, body_axes, ecef_to_geodetic
 
 
 @pytest.mark.slow
@@ -68,6 +68,14 @@ def test_the_flight_through_a_circles_state_vectors_is_the_circle(epoch):
     r, v = circle(epoch + t)
     assert_allclose(flight.position(t), r, rtol=0, atol=1e-5)
     assert_allclose(flight.velocity(t), v, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("look", "squint"), [(0.6, 0.0), (0.5, 0.1), (0.4, -0.2)])
+def test_look_and_squint_are_those_of_the_boresight(look, squint):
+    r, v = circle(700.0)
+    ray = body_axes(r, v).T @ antenna_axes(look, squint)[2]
+    true = SimpleNamespace(r=r, v=v, r_f=r + 8e5 * ray)
+    assert_allclose(Patch(true, 0.0, 8e5, 0.0, 1, 0).pointing, (look, squint), atol=1e-12)
 
 
 def test_patches_avoid_missing_lines():
