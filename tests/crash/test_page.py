@@ -71,6 +71,8 @@ def test_a_course_ends_where_the_outcome_does():
     assert_allclose(drawn.nees[-1], outcome.honesty, rtol=1e-12)
     assert_allclose(drawn.error[-1], outcome.median, rtol=1e-12)
     assert_allclose(np.mean(drawn.nis[1:]), outcome.nis, rtol=1e-9)
+    judged = [found.estimate.cov[..., i, i] for i in problem.judged]
+    assert_allclose(drawn.claimed, np.median(np.sqrt(np.sum(judged, axis=0)), axis=1), rtol=1e-12)
 
 
 def test_nis_leaves_out_what_was_not_measured():

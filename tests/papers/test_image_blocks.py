@@ -89,7 +89,7 @@ def test_the_ground_passes_as_fast_as_the_place_of_a_block_says(acquired):
     image = acquired.focuser.image(acquired.effective(acquired.speed), acquired.slope)
     place = BlockPlace.of(acquired, image, cut_blocks(image, 512, 256)[0])
     along = 10 * acquired.v / np.linalg.norm(acquired.v)
-    t, _ = _flight(acquired).closest(place.r_f + [0 * along, along])
+    t, _ = _flight(acquired).closest(np.stack([place.r_f, place.r_f + along]))
     assert_allclose(place.ground_speed, 10 / np.diff(t)[0], rtol=1e-4)
 
 

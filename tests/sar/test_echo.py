@@ -129,6 +129,17 @@ def test_synthesis_with_palsar(flight, hit):
     assert np.linalg.norm(found - exact) < 0.01 * np.linalg.norm(exact)
 
 
+def test_a_window_may_begin_far_in_front_of_what_scatters(small, flight, hit):
+    p, more = at(flight, hit, 0.02, 150.0, 90.0), 8000
+    near = centred_window(small, flight, hit, 64, 64)
+    begins = near.near_range - more * small.range_spacing
+    early = near._replace(near_range=begins, ranges=near.ranges + more)
+    echoes, rows = echoes_of(flight, [p], [90.0]), np.arange(40, near.pulses, 150)
+    exact = received(small, flight, p, near, rows)
+    found = synthesize(small, flight, early, echoes)[rows, more:]
+    assert np.linalg.norm(found - exact) < 0.015 * np.linalg.norm(exact)
+
+
 def test_what_the_receiver_takes_away(small, flight, hit):
     """Sampling a chirp of sharp edges directly lets in 3 to 6 % that lies out of the band."""
     window, rows = centred_window(small, flight, hit, 32, 32), np.array([900])
