@@ -35,10 +35,11 @@ from navfilters.papers.pogorelsky2020 import (
     write_own,
 )
 from navfilters.papers.pogorelsky2020.image_blocks import _flight
+from navfilters.papers.pogorelsky2020.pixel_errors import terrain_normal
 from navfilters.sar.images.autofocusing import hill_climb, sharpness
 from navfilters.sar.images.slant_image import Image
 from navfilters.sar.raw.radar import Radar
-from navfilters.space import ellipsoid_intersection
+from navfilters.space import ecef_to_geodetic, ellipsoid_intersection
 
 SMALL = Imaging(
     radar=Radar(wavelength=0.059, pulse_length=4e-6), lines=1024, samples=256, half_width=1800.0
@@ -206,6 +207,33 @@ def test_stored_sets_come_back(tmp_path):
     assert again.variance[0][0].climb(7400.0, (4.0,)) == found.variance[0][0].climb(7400.0, (4.0,))
     with pytest.raises(ValueError, match="found none"):
         read_own(tmp_path / "other.npz")
+
+
+def test_each_image_of_ones_own_has_the_normal_of_its_ground(monkeypatch):
+    """A slope to the east leans to the west; images that cost nothing."""
+    ground = SimpleNamespace(height=lambda latitude, longitude: 1e4 * np.asarray(longitude))
+    scene = SimpleNamespace(terrain=ground)
+
+    def sighting(k, imaging, lines, samples):
+        return own_images.Sighting(SimpleNamespace(scene=scene), k, None)
+
+    monkeypatch.setattr(own_images, "look_at", sighting)
+    monkeypatch.setattr(
+        own_images, "block_tables", lambda acquired, k, matches, by: [table(k, 0.0)]
+    )
+    found = own_tables(2, progress=lambda work: nullcontext(lambda done: None))
+    assert [len(of_k) for of_k in found.entropy] == [2, 2, 2]
+    for k, normals in enumerate(found.normal):
+        latitude, longitude, _ = ecef_to_geodetic(found.variance[k][0].r_f[0])
+        assert_array_equal(normals[0], normals[1])
+        assert_allclose(normals[0], terrain_normal(ground, float(latitude), float(longitude)))
+
+
+def test_the_errors_of_pixels_are_summed_up_by_their_squares():
+    """Over all images and runs in which a pixel was matched."""
+    errors = np.array([[[3.0, 0, 1], [np.nan] * 3], [[0, 2, 1], [6, 2, 1]]])
+    found = SimpleNamespace(axes=np.broadcast_to(np.eye(3), (2, 2, 3, 3)), errors=errors)
+    assert_allclose(own_images.measured_sigma(found), np.sqrt([15.0, 8 / 3, 1.0]))
 
 
 def test_a_campaign_stores_each_image_of_a_direct_run_and_its_report(tmp_path, monkeypatch):
