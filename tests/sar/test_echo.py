@@ -129,17 +129,6 @@ def test_synthesis_with_palsar(flight, hit):
     assert np.linalg.norm(found - exact) < 0.01 * np.linalg.norm(exact)
 
 
-def test_a_window_may_begin_far_in_front_of_what_scatters(small, flight, hit):
-    p, more = at(flight, hit, 0.02, 150.0, 90.0), 8000
-    near = centred_window(small, flight, hit, 64, 64)
-    begins = near.near_range - more * small.range_spacing
-    early = near._replace(near_range=begins, ranges=near.ranges + more)
-    echoes, rows = echoes_of(flight, [p], [90.0]), np.arange(40, near.pulses, 150)
-    exact = received(small, flight, p, near, rows)
-    found = synthesize(small, flight, early, echoes)[rows, more:]
-    assert np.linalg.norm(found - exact) < 0.015 * np.linalg.norm(exact)
-
-
 def test_what_the_receiver_takes_away(small, flight, hit):
     """Sampling a chirp of sharp edges directly lets in 3 to 6 % that lies out of the band."""
     window, rows = centred_window(small, flight, hit, 32, 32), np.array([900])
@@ -224,6 +213,17 @@ def test_raster_keeps_the_power(small, flight, scene):
     assert_allclose(np.mean(np.abs(one.amplitude) ** 2), power.mean(), rtol=0.1)
     again = scene_raster(small, flight, scene, window, lines, samples, 3, margin=8)
     assert_array_equal(one.amplitude, again.amplitude)
+
+
+def test_dark_ground_has_its_heights_too(small, flight, scene):
+    dark = replace(scene, cover=replace(scene.cover, reflectivity=1e-9 * scene.cover.reflectivity))
+    p = geodetic_to_ecef(scene.map.latitude, scene.map.longitude, scene.height(0.0, 0.0))
+    window = centred_window(small, flight, p, 32, 32)
+    power, height, _ = _facets(small, flight, scene, window, 32, 32, 8)
+    darker, same, _ = _facets(small, flight, dark, window, 32, 32, 8)
+    assert_allclose(darker, 1e-9 * power, rtol=1e-5)
+    assert_allclose(same, height, rtol=1e-5)
+    assert np.ptp(height) > 5
 
 
 def test_noise_is_that_of_the_reflectivity(small, flight, scene):
