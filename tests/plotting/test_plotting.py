@@ -94,6 +94,14 @@ def test_failures_are_marked_and_counted(ax):
     assert plotting.mark_failures(ax, [1, 2], [False, False], "UKF") == 0
 
 
+def test_each_row_of_failures_lies_below_the_one_before(ax):
+    for row in range(5):
+        plotting.mark_failures(ax, [1.0], [True], "UKF", row=row)
+    heights = np.array([marks.get_ydata()[0] for marks in ax.get_lines()])
+    assert 1 > heights[0] > heights[-1] > 0.8
+    assert_allclose(np.diff(heights), np.diff(heights)[0])
+
+
 @pytest.mark.parametrize("log_k", [True, False])
 def test_a_curve_wears_its_style_and_few_markers(ax, log_k):
     k = np.arange(1, 1001)
