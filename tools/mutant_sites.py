@@ -6,6 +6,7 @@ Oracles are left out: they are tests of the rest.
 import ast
 import random
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -34,6 +35,13 @@ class Mutant:
     end: int
     old: str
     new: str
+    text: str  # of the line
+    nth: int  # of the same edits of such a line in the file, from 0
+
+    @property
+    def name(self) -> tuple[str, ...]:
+        """What stays when other lines of the library change."""
+        return self.file, self.kind, self.old, self.new, self.text, str(self.nth)
 
     def of(self, source: bytes) -> bytes:
         return source[: self.start] + self.new.encode() + source[self.end :]
@@ -60,7 +68,10 @@ class Sites(ast.NodeVisitor):
     def add(self, kind: str, start: int, end: int, new: str) -> None:
         line = self.source.count(b"\n", 0, start) + 1
         old = self.source[start:end].decode()
-        self.found.append(Mutant(self.file, line, kind, start, end, old, new))
+        text = self.source[slice(*self.lines[line - 1 : line + 1])].decode().strip()
+        edit = (kind, old, new, text)
+        nth = sum((m.kind, m.old, m.new, m.text) == edit for m in self.found)
+        self.found.append(Mutant(self.file, line, kind, start, end, old, new, text, nth))
 
     def between(self, kind: str, left: ast.AST, right: ast.AST, op: ast.AST, table: dict) -> None:
         """Another operator between two operands."""
@@ -144,8 +155,16 @@ def changes(root: Path, mutant: Mutant) -> bool:
         return False
 
 
-def sample(root: Path, seed: int, count: int, only: str = "") -> list[Mutant]:
-    """A larger sample of the same seed begins with the smaller one."""
+def sample(
+    root: Path, seed: int, count: int, only: str = "", drawn: Iterable[tuple[str, ...]] = ()
+) -> list[Mutant]:
+    """Those drawn before, by name, that are still possible, and as many more as are wanted.
+
+    A larger sample of the same seed begins with the smaller one.
+    """
     every = [m for m in mutants(root) if only in m.file]
     random.Random(seed).shuffle(every)
-    return list(islice((m for m in every if changes(root, m)), count))
+    possible = {m.name: m for m in every}
+    before = [possible.pop(name) for name in drawn if name in possible]
+    chosen = (m for m in [*before, *possible.values()] if changes(root, m))
+    return list(islice(chosen, count))

@@ -1,7 +1,7 @@
 """How many small faults the unit tests see: a seeded sample of mutants of the library.
 
 Each is one edit of one file, made in a copy of the project. Started again with the same seed, it
-goes on where it was.
+goes on where it was, also if other lines of the library have changed.
 """
 
 import argparse
@@ -105,6 +105,13 @@ def summary(seed: int, rows: list[dict]) -> dict:
     return {**counts, "per_cent_seen": round(score, 1), "mutants": done}
 
 
+def drawn_before(path: Path, seed: int) -> dict[tuple[str, ...], dict]:
+    """Rows of the report of a seed, by their mutants' names."""
+    report = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"seed": None}
+    rows = report["mutants"] if report["seed"] == seed else []
+    return {Mutant(*(row[f.name] for f in fields(Mutant))).name: row for row in rows}
+
+
 def store(path: Path, report: dict) -> None:
     path.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 
@@ -138,21 +145,20 @@ def main() -> None:
     parser.add_argument("--again", action="store_true", help="try again what survived")
     parser.add_argument("--store", type=Path, default=STORED)
     options = parser.parse_args()
-    chosen = sample(ROOT, options.seed, options.count, options.only)
-    rows, said = [asdict(mutant) for mutant in chosen], EXPLAINED.read_text(encoding="utf-8")
-    if options.store.exists():
-        stored = json.loads(options.store.read_text(encoding="utf-8"))["mutants"]
-        known = {Mutant(*(row[f.name] for f in fields(Mutant))): row for row in stored}
-        rows = [known.get(mutant, asdict(mutant)) for mutant in chosen]
+    known = drawn_before(options.store, options.seed)
+    chosen = sample(ROOT, options.seed, options.count, options.only, known)
+    rows = [known.get(mutant.name, {}) | asdict(mutant) for mutant in chosen]
+    said = EXPLAINED.read_text(encoding="utf-8")
     with TemporaryDirectory() as folder:
         root = Path(folder)
         copied(root)
-        suite = measured(root)
+        suite = None  # measured once a mutant is tried
         for i, (mutant, row) in enumerate(zip(chosen, rows, strict=True), 1):
             by = row.get("seen_by", "explained")
             if explained(ROOT, mutant, said):
                 row["seen_by"] = "explained"
             elif by == "explained" or (options.again and by in OTHERS):
+                suite = suite or measured(root)
                 row["tries"] = row.get("tries", 0) + 1
                 row["seen_by"], row["s"] = seen(root, mutant, suite, options.limit)
                 where = f"{i}  {mutant.file}:{mutant.line}  {mutant.kind}"

@@ -97,6 +97,8 @@ def test_summary_and_scorecard_count_and_list(ledger):
     page = claims.scorecard("someone1999")._repr_html_()
     assert '<a href="part/chapter.html#claim-ten">Fig. 1</a>' in page
     assert "claim-own" not in page
+    assert "<summary>2 claims: " in page
+    assert "<summary>1 claim: " in claims.scorecard("this book")._repr_html_()
     assert repr(claims.scorecard("this book")) == "[established here] own: paper none, ours 10.5"
     with pytest.raises(ClaimError, match="nobody"):
         claims.scorecard("nobody")

@@ -10,7 +10,7 @@ from bs4 import BeautifulSoup
 from numpy.testing import assert_allclose
 
 from navfilters import FILTERS
-from navfilters.crash import CHECKS, crash_test, from_filterpy, from_functions
+from navfilters.crash import CHECKS, crash_test, figures, from_filterpy, from_functions
 from navfilters.crash.comparison import champion, course, nis_of
 from navfilters.crash.planted import textbook_ekf as ekf
 from navfilters.problems import problems
@@ -59,6 +59,13 @@ def test_without_matplotlib_one_line_says_so(report, monkeypatch):
     assert soup.text.count("pictures of a report needs matplotlib: pip install") == 1
 
 
+def test_the_colours_of_a_map_end_where_its_numbers_do(monkeypatch):
+    monkeypatch.setattr(figures, "_svg", lambda figure: figure)
+    figure, _ = figures._map(figures._ekf(figures.starts)["map"])
+    bar = figure.axes[-1]
+    assert bar.get_ylim() == (bar.get_yticks()[0], bar.get_yticks()[-1])
+
+
 def test_an_interrupted_report_says_so_on_its_page():
     def stop(x, P, z, model):
         raise KeyboardInterrupt
@@ -76,6 +83,8 @@ def test_a_course_ends_where_the_outcome_does():
     assert_allclose(drawn.nees[-1], outcome.honesty, rtol=1e-12)
     assert_allclose(drawn.error[-1], outcome.median, rtol=1e-12)
     assert_allclose(np.mean(drawn.nis[1:]), outcome.nis, rtol=1e-9)
+    judged = [found.estimate.cov[..., i, i] for i in problem.judged]
+    assert_allclose(drawn.claimed, np.median(np.sqrt(np.sum(judged, axis=0)), axis=1), rtol=1e-12)
 
 
 def test_nis_leaves_out_what_was_not_measured():

@@ -121,6 +121,14 @@ right, wrong = ekf(), ekf("no wrap")
 """
 
 
+def test_the_help_says_what_passes_in_paragraphs_of_one_indent(capsys):
+    with pytest.raises(SystemExit):
+        navfilters(["crash-test", "--help"])
+    said = capsys.readouterr().out.partition("what passes:\n")[2]
+    indents = {len(line) - len(line.lstrip()) for line in said.splitlines() if line}
+    assert indents == {2, 6}
+
+
 def test_the_command(tmp_path, monkeypatch, capsys):
     (tmp_path / "mine.py").write_text(MINE)
     monkeypatch.chdir(tmp_path)

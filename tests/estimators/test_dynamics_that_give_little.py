@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from navfilters import FILTERS, Gaussian, run
+from navfilters.estimators.model_parts import moved
 from navfilters.models import Linear
 
 PRIOR = Gaussian(np.array([0.3, 0.2]), np.array([[0.5, 0.1], [0.1, 0.4]]))
@@ -38,6 +39,12 @@ WAYS = {
     "propagate": {"propagate": lambda x, Q: (f(x), F(x), Q)},
     "f and its second derivatives": {"f": f, "hessian": hessian},
 }
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_state_moves_the_same_way_by_each(way):
+    x = np.array([[0.3, 0.2], [0.1, -1.0]])
+    assert_array_equal(moved(SimpleNamespace(Q=Q, **WAYS[way]), x), f(x))
 
 
 @pytest.mark.parametrize("name", ["EKF", "mtSOF", "UKF"])

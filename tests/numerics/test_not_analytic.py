@@ -48,6 +48,10 @@ NOT_ANALYTIC = {
     "tiny": (lambda x: x * abs(x), [1e-9, -1e-9]),
     "huge": (lambda x: x * abs(x), [1e9, -1e9]),
     "beside a large constant": (lambda x: 1e6 + x + 0.5 * abs(x), [3.0, 4.0]),
+    "beside a larger constant and a larger component": (
+        lambda x: 3e7 + x[:1] ** 2 + x[1:] ** 2 + 0.02 * abs(x[:1]),
+        [1.0, 50.0],
+    ),
     "its own rounding": (lambda x: (1 - np.cos(x)) / x**2, [1e-6]),
 }
 

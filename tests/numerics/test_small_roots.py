@@ -84,6 +84,8 @@ def test_a_semidefinite_matrix_has_a_root(n, rank):
     assert (np.abs(T @ A @ T.mT - A) <= allowed).all()
     assert ((S != 0).any(axis=-2).sum(axis=-1) == rank).all()  # a column for each direction
     assert_array_equal(np.trace(T, axis1=-2, axis2=-1), np.full(len(A), rank))
+    for found, alone in zip(semidefinite_root(A[:, None]), (S, T), strict=True):
+        assert_array_equal(found, alone[:, None])
 
 
 @sizes
@@ -106,6 +108,14 @@ def test_the_root_is_the_limit_of_cholesky_factors():
     S, _ = semidefinite_root(A)
     assert_allclose(S, cholesky(A + 1e-12 * np.eye(3)), atol=1e-5)
     assert_array_equal(S, np.tril(S))
+
+
+def test_a_pivot_that_is_rounding_is_zero_though_all_others_are_whole():
+    A = np.diag([1.0, 1 + 4 * np.finfo(float).eps, 1.0])
+    A[0, 1] = A[1, 0] = 1.0
+    S, T = semidefinite_root(A)
+    assert_array_equal(S[:, 1], np.zeros(3))
+    assert_array_equal(T[1], [1.0, 0.0, 0.0])
 
 
 def test_a_row_that_waits_for_a_later_one():

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from navfilters.numerics.runge_kutta import runge_kutta
-from navfilters.numerics.whole_paths import in_steps, whole_path
+from navfilters.numerics.whole_paths import _guess, in_steps, whole_path
 from navfilters.space import Orbit
 from navfilters.space.thrust import Thrust
 
@@ -53,6 +53,20 @@ def test_few_sweeps_do():
 
     whole_path(increment, CIRCULAR, 1.0, 100, 100)
     assert len(calls) < 20
+
+
+def test_the_first_guess_is_near():
+    """A quintic through 100 s of an orbit: a metre, and two centimetres a second."""
+    orbit = Orbit()
+
+    def increment(steps, x, h):
+        return runge_kutta(orbit.derivative, x, h) - x
+
+    path = in_steps(increment, CIRCULAR, 1.0, 100)
+    guess = np.concatenate([path[:1], np.zeros((100, 6))])
+    _guess(increment, guess, 1.0)
+    assert np.abs(guess - path)[:, :3].max() < 1.0
+    assert np.abs(guess - path)[:, 3:].max() < 0.02
 
 
 def test_where_no_sweep_comes_to_rest_the_steps_are_taken_one_by_one():

@@ -133,6 +133,10 @@ def test_it_refuses_what_it_cannot_be(changed, message):
         ExactPosterior(**given)
 
 
+def test_the_widest_bearing_that_it_takes_is_the_one_that_it_names():
+    assert ExactPosterior(SETUP.z, 1, np.diag([1.0, 0.2**2])).moments.cov.shape == (2, 2)
+
+
 @pytest.mark.parametrize("polar", [False, True])
 def test_bearings_that_are_turned_have_the_level_of_the_problem_turned(polar):
     """A mean bearing beyond half a turn, where the point's own is on the other branch."""

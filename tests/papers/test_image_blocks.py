@@ -2,6 +2,7 @@
 
 from contextlib import nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.interpolate import CubicSpline
 from navfilters.papers.pogorelsky2020 import (
     CASES,
     NOMINAL,
+    BlockPlace,
     DifferentImages,
     Images,
     ImageTable,
@@ -19,6 +21,8 @@ from navfilters.papers.pogorelsky2020 import (
     acquire,
     block_curves,
     block_tables,
+    campaign,
+    campaign_report,
     cut_blocks,
     fly_own_images,
     match_blocks,
@@ -30,10 +34,12 @@ from navfilters.papers.pogorelsky2020 import (
     truth,
     write_own,
 )
+from navfilters.papers.pogorelsky2020.image_blocks import _flight
+from navfilters.papers.pogorelsky2020.pixel_errors import terrain_normal
 from navfilters.sar.images.autofocusing import hill_climb, sharpness
 from navfilters.sar.images.slant_image import Image
 from navfilters.sar.raw.radar import Radar
-from navfilters.space import ellipsoid_intersection
+from navfilters.space import ecef_to_geodetic, ellipsoid_intersection
 
 SMALL = Imaging(
     radar=Radar(wavelength=0.059, pulse_length=4e-6), lines=1024, samples=256, half_width=1800.0
@@ -77,6 +83,15 @@ def test_the_criteria_see_the_truth_and_the_matches_find_it(acquired):
     assert_allclose(tables[1].sharpness, -curves.entropy[:, 1])
     assert_allclose(tables[1].r_f[0] - tables[1].truth, matches.error[1])
     assert tables[0].climb(acquired.speed + 40, (20.0, 5.0)).ended == "peak"
+
+
+def test_the_ground_passes_as_fast_as_the_place_of_a_block_says(acquired):
+    """The next 10 m along the flight are closest so much later."""
+    image = acquired.focuser.image(acquired.effective(acquired.speed), acquired.slope)
+    place = BlockPlace.of(acquired, image, cut_blocks(image, 512, 256)[0])
+    along = 10 * acquired.v / np.linalg.norm(acquired.v)
+    t, _ = _flight(acquired).closest(np.stack([place.r_f, place.r_f + along]))
+    assert_allclose(place.ground_speed, 10 / np.diff(t)[0], rtol=1e-4)
 
 
 def test_other_terrain_is_other_ground(acquired):
@@ -192,6 +207,52 @@ def test_stored_sets_come_back(tmp_path):
     assert again.variance[0][0].climb(7400.0, (4.0,)) == found.variance[0][0].climb(7400.0, (4.0,))
     with pytest.raises(ValueError, match="found none"):
         read_own(tmp_path / "other.npz")
+
+
+def test_each_image_of_ones_own_has_the_normal_of_its_ground(monkeypatch):
+    """A slope to the east leans to the west; images that cost nothing."""
+    ground = SimpleNamespace(height=lambda latitude, longitude: 1e4 * np.asarray(longitude))
+    scene = SimpleNamespace(terrain=ground)
+
+    def sighting(k, imaging, lines, samples):
+        return own_images.Sighting(SimpleNamespace(scene=scene), k, None)
+
+    monkeypatch.setattr(own_images, "look_at", sighting)
+    monkeypatch.setattr(
+        own_images, "block_tables", lambda acquired, k, matches, by: [table(k, 0.0)]
+    )
+    found = own_tables(2, progress=lambda work: nullcontext(lambda done: None))
+    assert [len(of_k) for of_k in found.entropy] == [2, 2, 2]
+    for k, normals in enumerate(found.normal):
+        latitude, longitude, _ = ecef_to_geodetic(found.variance[k][0].r_f[0])
+        assert_array_equal(normals[0], normals[1])
+        assert_allclose(normals[0], terrain_normal(ground, float(latitude), float(longitude)))
+
+
+def test_the_errors_of_pixels_are_summed_up_by_their_squares():
+    """Over all images and runs in which a pixel was matched."""
+    errors = np.array([[[3.0, 0, 1], [np.nan] * 3], [[0, 2, 1], [6, 2, 1]]])
+    found = SimpleNamespace(axes=np.broadcast_to(np.eye(3), (2, 2, 3, 3)), errors=errors)
+    assert_allclose(own_images.measured_sigma(found), np.sqrt([15.0, 8 / 3, 1.0]))
+
+
+def test_a_campaign_stores_each_image_of_a_direct_run_and_its_report(tmp_path, monkeypatch):
+    """Tables and images that cost nothing: a second call makes none."""
+    tables, made = [table(k, 0.5) for k in (1, 2, 3)], []
+
+    def measured(k, start, imaging):
+        made.append(k)
+        return tables[k - 1].climb(start, imaging.steps), SimpleNamespace(r_f=tables[k - 1].r_f[0])
+
+    monkeypatch.setattr(campaign, "_table", lambda store, k, done: tables[k - 1])
+    monkeypatch.setattr(campaign, "acquire", lambda setup, k, imaging: k)
+    monkeypatch.setattr(campaign, "measure_directly", measured)
+    found = campaign.run_campaign(tmp_path, 3, 2, imaging=SMALL)
+    assert made == [1, 1, 2, 2, 3, 3]
+    assert (tmp_path / "summary.txt").read_text() == campaign_report(found)
+    again = campaign.run_campaign(tmp_path, 3, 2, imaging=SMALL)
+    assert made == [1, 1, 2, 2, 3, 3]
+    assert campaign_report(again) == campaign_report(found)
 
 
 @pytest.mark.slow

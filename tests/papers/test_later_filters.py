@@ -21,6 +21,16 @@ def test_runs_are_those_of_the_oracle():
     np.testing.assert_array_equal(got.outside, (square > stats.chi2.ppf(0.99, 2)).mean(axis=-1))
 
 
+def test_noises_are_drawn_first_and_then_the_starts():
+    """What a seed gives is a number that the library promises."""
+    setup, rng = Setup(), np.random.default_rng(3)
+    given = later_filters.experiment(setup, 4, 2, seed=3)
+    R = setup.range_variance, setup.bearing_variance
+    np.testing.assert_allclose(given.z - setup.z, rng.standard_normal((2, 4, 2)) * np.sqrt(R))
+    start = (given.start - setup.x_true) / setup.sigma
+    np.testing.assert_allclose(start, rng.standard_normal((4, 2)))
+
+
 def test_the_command_prints_every_combination(capsys):
     later_filters.main(["--runs", "2", "--updates", "2"])
     lines = capsys.readouterr().out.splitlines()

@@ -13,7 +13,7 @@ from palsar_scene import (
 )
 
 from navfilters.papers import pogorelsky2020
-from navfilters.papers.pogorelsky2020 import CASES, NOMINAL
+from navfilters.papers.pogorelsky2020 import CASES, NOMINAL, real_loop
 from navfilters.papers.pogorelsky2020.real_loop import real_table as table
 from navfilters.papers.pogorelsky2020.real_loop import run_filter, true_flight
 from navfilters.papers.pogorelsky2020.real_patches import cut_patches
@@ -85,3 +85,13 @@ def test_the_range_has_the_runs_own_noise(product, patches):
     assert_allclose(found.slant_range, patches[0].slant_range + 1.5)
     none = images(1, state)
     assert all(np.isnan(value).all() for value in none)
+
+
+def test_a_report_is_the_table_of_the_runs_on_the_files(monkeypatch):
+    """Each part is made of those before it."""
+    monkeypatch.setattr(real_loop, "open_product", lambda folder: f"product of {folder}")
+    monkeypatch.setattr(real_loop, "cut_patches", lambda product, *files, **_: [product, *files])
+    monkeypatch.setattr(real_loop, "run_filter", lambda *given, **_: given[:2])
+    monkeypatch.setattr(real_loop, "real_table", lambda *given: given)
+    product, patches = "product of A", ["product of A", "B", "C"]
+    assert real_loop.report("A", "B", "C", "TC-2") == (product, patches, (product, patches))

@@ -20,11 +20,12 @@ from palsar_scene import (
     line_time,
     write_reference,
 )
+from scipy.constants import c
 
 from navfilters.papers.pogorelsky2020 import CASES, Setup
 from navfilters.papers.pogorelsky2020.real_flight import first_lines, fitted, flight_through
 from navfilters.papers.pogorelsky2020.real_loop import run_filter
-from navfilters.papers.pogorelsky2020.real_patches import cut_patches
+from navfilters.papers.pogorelsky2020.real_patches import Patch, _sizes, cut_patches
 from navfilters.sar.palsar.opening import open_product
 from navfilters.sar.palsar.orbit_and_pulse import StateVectors
 from navfilters.sar.palsar.product import Product
@@ -34,7 +35,7 @@ from navfilters.sar.raw.observation import _bright
 from navfilters.sar.raw.radar import Window
 from navfilters.sar.raw.rasters import scene_raster
 from navfilters.sar.raw.synthesis import synthesize
-from navfilters.space.frames import ecef_to_geodetic
+from navfilters.space.frames import antenna_axes, body_axes, ecef_to_geodetic
 
 
 @pytest.mark.slow
@@ -59,6 +60,23 @@ def circle(t):
     return 7.071e6 * r, 7.071e6 * v
 
 
+def test_a_patch_reads_the_samples_through_which_its_points_migrate():
+    """By the distance at the aperture's ends, on a path that is no hyperbola."""
+    times, spacing = 43000.0 + 60.0 * np.arange(-13, 15), c / 64e6
+    product = SimpleNamespace(
+        state_vectors=StateVectors(times, *circle(times)), near_range=8.5e5, wavelength=0.236,
+        line_times=43000.0 + np.arange(9) / 2000.0, lines=9, samples=4000, prf=2000.0,
+        sampling_rate=32e6, pulse_length=16e-6, image="IMG",
+    )  # fmt: skip
+    sizes = _sizes(product, Setup(), SMALL)
+    flight, R = flight_through(product, 43000.0), 8.5e5 + (4000 - 512) / 2 * spacing
+    t = (sizes.pulses - SMALL.lines) / 2 / product.prf
+    edge = flight.position(t) - flight.ground_point(0.0, R, 0.0)
+    cells = (np.linalg.norm(edge) - R) / spacing
+    assert cells > 4
+    assert abs(sizes.ranges - SMALL.samples - 512 - cells - 1) < 1.0
+
+
 @pytest.mark.parametrize("epoch", [43000.0, 43031.0, 42955.0])
 def test_the_flight_through_a_circles_state_vectors_is_the_circle(epoch):
     """To what is promised: 10 micrometres and 1 micrometre a second."""
@@ -68,6 +86,14 @@ def test_the_flight_through_a_circles_state_vectors_is_the_circle(epoch):
     r, v = circle(epoch + t)
     assert_allclose(flight.position(t), r, rtol=0, atol=1e-5)
     assert_allclose(flight.velocity(t), v, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("look", "squint"), [(0.6, 0.0), (0.5, 0.1), (0.4, -0.2)])
+def test_look_and_squint_are_those_of_the_boresight(look, squint):
+    r, v = circle(700.0)
+    ray = body_axes(r, v).T @ antenna_axes(look, squint)[2]
+    true = SimpleNamespace(r=r, v=v, r_f=r + 8e5 * ray)
+    assert_allclose(Patch(true, 0.0, 8e5, 0.0, 1, 0).pointing, (look, squint), atol=1e-12)
 
 
 def test_patches_avoid_missing_lines():

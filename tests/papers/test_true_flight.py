@@ -36,6 +36,12 @@ def test_constants():
         assert_allclose(setup.geometry.look, np.deg2rad(34.3))
 
 
+def test_noise_is_given_by_its_deviations():
+    setup = Setup(sigma_range=2.0, sigma_speed=3.0, pixel=(1.0, 2.0, 5.0))
+    assert_allclose(np.diag(setup.geometry.R), [0, 0, 4, 9])
+    assert_allclose(np.linalg.eigvalsh(setup.geometry.D), [1, 4, 25])
+
+
 def test_the_first_state():
     """Circular at 691.5 km, 98.16 degrees, ascending, the beam on Houston."""
     x = initial_state()

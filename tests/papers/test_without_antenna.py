@@ -12,6 +12,7 @@ from navfilters.papers.pogorelsky2020 import (
     CASES,
     Trial,
     antenna_table,
+    antenna_tables,
     fly,
     fly_with_offsets,
     monte_carlo,
@@ -118,6 +119,13 @@ def test_bad_input():
         fly(SETUP, [])
     with pytest.raises(ValueError, match=r"sigma must be of .*; found \['height'\]"):
         fly_with_offsets(SETUP, [Trial()], {"height": 1.0})
+
+
+def test_a_trial_of_the_table_is_flown_alone():
+    found = fly("TC-2", [Trial(late=1e-3)], 2, [3, 5], 1)
+    errors, covariances = antenna_tables._flown("TC-2", Trial(late=1e-3), 2, [3, 5], 1)
+    assert_array_equal(errors, found.errors[2, 0])
+    assert_array_equal(covariances, found.covariances[2, 0])
 
 
 @pytest.mark.slow

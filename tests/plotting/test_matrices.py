@@ -30,6 +30,7 @@ def test_a_cell_says_error_and_honesty_and_nothing_where_there_is_no_pair():
     figure, ax = honesty_matrix(["EKF"], ["a", "b", "c"], ratio, honesty, [[0, 1, 0]])
     words = [text.get_text() for text in ax.texts]
     assert words == ["1.0", "●1.0", "500", "▲>1000", "–"]
+    assert ax.texts[-1].get_fontsize() == ax.texts[0].get_fontsize()
     frames = [patch for patch in ax.patches if not patch.get_fill()]
     assert len(frames) == 1
     light, dark = (np.mean(p.get_facecolor()[:3]) for p in ax.patches if p.get_fill())

@@ -36,6 +36,14 @@ def test_no_two_filters_look_alike(one, other):
         assert a["marker"] != b["marker"]
 
 
+@pytest.mark.parametrize(("log_x", "scale"), [(True, "log"), (False, "linear")])
+def test_a_sweep_may_be_over_decades(log_x, scale):
+    x = [1.0, 10.0, 100.0]
+    results = dict.fromkeys(FILTERS, np.ones(3))
+    _, axes = plotting.sweep_panels(x, results, "x", floor=1e-3, log_x=log_x)
+    assert {ax.get_xscale() for ax in axes} == {scale}
+
+
 @pytest.mark.parametrize(
     "ends",
     [[0.2, 0.5, 0.8], [0.5] * 4, [0.98, 0.99, 1.0], [0.0, 0.0, 0.01], [-3.0, 0.5, 4.0]],
@@ -84,6 +92,14 @@ def test_failures_are_marked_and_counted(ax):
     assert_array_equal(marks.get_xdata(), [2, 4])
     assert marks.get_color() == STYLES["UKF"]["color"]
     assert plotting.mark_failures(ax, [1, 2], [False, False], "UKF") == 0
+
+
+def test_each_row_of_failures_lies_below_the_one_before(ax):
+    for row in range(5):
+        plotting.mark_failures(ax, [1.0], [True], "UKF", row=row)
+    heights = np.array([marks.get_ydata()[0] for marks in ax.get_lines()])
+    assert 1 > heights[0] > heights[-1] > 0.8
+    assert_allclose(np.diff(heights), np.diff(heights)[0])
 
 
 @pytest.mark.parametrize("log_k", [True, False])

@@ -8,7 +8,7 @@ import pytest
 from navfilters import FILTERS, Gaussian
 from navfilters.estimators import AdaptiveRobust, Filter
 from navfilters.models import Linear
-from navfilters.problems import Draw, Noisier, Problem, evaluations, problems, treat
+from navfilters.problems import Draw, Noisier, Outcome, Problem, evaluations, problems, treat
 from navfilters.problems.problem import streams
 
 H, R = np.array([[1.0, 0.5], [0.0, 1.0]]), np.diag([1.0, 4.0])
@@ -31,6 +31,13 @@ LINEAR = Problem("linear", drawn, Linear(H, R), STEPS, (0, 1), "m", STEPS)
 
 def told(factor):
     return replace(LINEAR, model=Linear(H, factor * R))
+
+
+def test_the_band_of_honesty_has_both_its_ends():
+    nees = np.array([1.9, 2.0, 2.5, 3.0, 3.1, np.inf])
+    none = np.zeros(6)
+    found = Outcome(none, none, 1.0, none, nees, 2, (2.0, 3.0), none, none)
+    assert found.honest.tolist() == [-1, 0, 0, 0, 1, 1]
 
 
 def test_the_kalman_filter_is_honest_and_as_good_as_the_reference():

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from polar_models import POLAR, PRIORS, AsClass, AsNamedTuple, R, Z, in_closures, quiet
 
 from navfilters import FILTERS, run
@@ -28,6 +28,11 @@ def test_a_model_that_was_changed_is_compiled_anew():
     for model in models:
         got = quiet(FILTERS["EKF"], PRIORS, Z, model, 2, engine="jax").final.mean
         assert_allclose(got, run(FILTERS["EKF"], PRIORS, Z, model, 2).mean[-1], rtol=1e-10)
+
+
+def test_no_step_is_none():
+    got = quiet(FILTERS["EKF"], PRIORS, Z, POLAR, 0, engine="jax")
+    assert_array_equal(got.final.mean, PRIORS.mean)
 
 
 def test_what_cannot_change_is_compiled_once():

@@ -179,16 +179,20 @@ def scene(flight, hit):
     return draw_scene(ground, LocalMap(float(place[0]), float(place[1])), 5, half_width=3000.0)
 
 
-def test_facets_are_where_they_are(flight, scene):
-    """The polynomials to time and range against the exact solution: 1e-3 of a sample."""
+@pytest.mark.parametrize("steepness", [1.0, 8.0])
+def test_facets_are_where_they_are(flight, scene, steepness):
+    """The polynomials to time and range against the exact solution: 1e-3 of a sample.
+
+    Also where the ground rises from 2.5 to 7.8 km.
+    """
     view = view_of(flight, geodetic_to_ecef(scene.map.latitude, scene.map.longitude))
     along, across = np.linspace(-3400, 3400, 7), np.linspace(-4800, 4800, 9)
     east, north = _lattice(view, along, across)
-    height = scene.height(east, north)
+    height = steepness * scene.height(east, north)
     got = _to_radar(flight, scene, view, along, across, height)(slice(None))
     exact = flight.closest(geodetic_to_ecef(*scene.map.geodetic(east, north), height))
     assert_allclose(got[0], exact[0], atol=1e-3 / PALSAR.prf)
-    assert_allclose(got[1], exact[1], atol=1e-3 * PALSAR.range_spacing)
+    assert_allclose(got[1], exact[1], rtol=0, atol=1e-3 * PALSAR.range_spacing)
 
 
 def test_raster_keeps_the_power(small, flight, scene):
@@ -209,6 +213,17 @@ def test_raster_keeps_the_power(small, flight, scene):
     assert_allclose(np.mean(np.abs(one.amplitude) ** 2), power.mean(), rtol=0.1)
     again = scene_raster(small, flight, scene, window, lines, samples, 3, margin=8)
     assert_array_equal(one.amplitude, again.amplitude)
+
+
+def test_dark_ground_has_its_heights_too(small, flight, scene):
+    dark = replace(scene, cover=replace(scene.cover, reflectivity=1e-9 * scene.cover.reflectivity))
+    p = geodetic_to_ecef(scene.map.latitude, scene.map.longitude, scene.height(0.0, 0.0))
+    window = centred_window(small, flight, p, 32, 32)
+    power, height, _ = _facets(small, flight, scene, window, 32, 32, 8)
+    darker, same, _ = _facets(small, flight, dark, window, 32, 32, 8)
+    assert_allclose(darker, 1e-9 * power, rtol=1e-5)
+    assert_allclose(same, height, rtol=1e-5)
+    assert np.ptp(height) > 5
 
 
 def test_noise_is_that_of_the_reflectivity(small, flight, scene):

@@ -17,7 +17,7 @@ from numpy.testing import assert_allclose
 from scipy.constants import c
 from scipy.fft import next_fast_len
 
-from navfilters.sar.images.focuser import Focuser
+from navfilters.sar.images.focuser import GUARD, Focuser
 from navfilters.sar.images.slant_image import effective_velocity
 from navfilters.sar.raw.echoes_of_points import point_echo
 from navfilters.sar.raw.observation import centred_window
@@ -153,6 +153,13 @@ def test_a_patch_is_the_middle_of_the_image(samples, change):
     assert off.max() < 1e-5 + 0.005 * 18 * 2 * abs(change) / 7182
     assert_allclose(part.near_range, whole.near_range + start * whole.range_spacing, rtol=1e-12)
     assert part.first_time == whole.first_time
+
+
+def test_a_patch_of_all_samples_is_the_focuser_itself():
+    """Where the guard is as wide as the pulse that is cut off anyway."""
+    focuser = Focuser(noise(pulses=64, radar=replace(PALSAR, pulse_length=2e-6)))
+    assert focuser.samples + 2 * GUARD == 500
+    assert focuser.patch(focuser.samples, 7182.0) is focuser
 
 
 def test_a_patch_of_a_patch():

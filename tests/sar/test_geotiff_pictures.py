@@ -97,6 +97,20 @@ def test_holes_get_the_median(tmp_path, scene):
     assert_allclose(found.values[105:], values[205:-100, 100:-100], rtol=0, atol=1e-4)
 
 
+def test_three_by_three_zeros_are_a_void_and_fewer_are_noise(tmp_path, scene):
+    """What lies beside a void was averaged with it."""
+    values = 10 ** (picture() / 10)
+    for rows, columns in ((3, 3), (2, 3), (3, 2)):
+        values[200 * (rows - 1) + columns :][:rows, 300:][:, :columns] = 0.0
+    path = as_file(tmp_path / "a.tif", values)
+    found = read_reference(path, scene, half_width=2000.0, needed=900.0, unit="linear").values
+    filled = np.median(found)
+    assert_allclose(found[302, 200:203], filled, atol=0.01)
+    for beside in ((202, 200), (301, 200)):
+        row, column = np.add(beside, 100)
+        assert_allclose(found[beside], 10 * np.log10(values[row, column]), atol=1e-3)
+
+
 @pytest.mark.parametrize("nothing", ["nodata", "zero", "infinite", "edge"])
 def test_a_patch_without_data_is_refused(tmp_path, scene, nothing):
     values, options = picture(), {}

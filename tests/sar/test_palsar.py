@@ -106,6 +106,15 @@ def test_the_time_of_a_line_is_better_than_its_millisecond(tmp_path):
         opened(tmp_path, clock_offset=np.nan)
 
 
+@pytest.mark.parametrize("inside", [1.0, 59.0])
+def test_lines_may_lie_between_the_outermost_state_vectors(tmp_path, inside):
+    got = opened(tmp_path)
+    first, last = got.state_vectors.times[[0, -1]]
+    for offset in (first + inside - got.line_times[0], last - inside - got.line_times[-1]):
+        moved = opened(tmp_path, clock_offset=offset)
+        assert_allclose(moved.line_times, got.line_times + offset, rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("prf", "rate"),
     [

@@ -81,6 +81,13 @@ def test_heights_pass_through_posts_and_end_with_them():
     assert np.isnan(ground.height(PLACE[0], PLACE[1] + 1.0))
 
 
+def test_posts_round_the_earth_know_every_longitude():
+    posts = np.tile(np.r_[np.arange(19.0), np.arange(17.0, -1.0, -1.0)], (5, 1))
+    globe = Terrain(posts, -20.0, 0.0, 10.0)
+    for east, height in ((20, 2), (190, 17), (350, 1), (-10, 1), (-170, 17), (530, 17)):
+        assert_allclose(globe.height(0.0, float(east)), height, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -268,3 +268,10 @@ REFUSED = {
 def test_bad_input_is_refused_by_name(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_no_orbit_is_faster_than_the_one_on_the_ground():
+    """Its pull is what keeps a point that turns so fast on the circle."""
+    round_earth = replace(EARTH, J2=0.0)
+    pull = round_earth.acceleration(np.array([EARTH.radius, 0.0, 0.0]))
+    assert_allclose(pull, [-(EARTH.fastest**2) * EARTH.radius, 0, 0], rtol=1e-12)

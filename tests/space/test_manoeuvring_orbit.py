@@ -132,3 +132,8 @@ def test_bad_input_is_named(change, message):
 def test_an_orbit_of_other_sub_steps_is_refused():
     with pytest.raises(ValueError, match=r"orbit.step must be 1 s; found 0.5"):
         manoeuvring(replace(SETUP.orbit(), step=0.5))
+
+
+def test_by_default_all_sub_steps_are_as_long():
+    orbit = ManoeuvringOrbit(np.eye(6))
+    assert orbit.interval % orbit.step == 0

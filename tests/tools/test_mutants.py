@@ -2,12 +2,13 @@
 
 import ast
 from copy import copy
+from dataclasses import asdict
 
 import mutant_order
 import pytest
 from mutant_order import Suite, measure, statement, tiers
 from mutant_sites import Mutant, Sites, sample
-from mutants import explained, failing, first_failure, seen, summary
+from mutants import drawn_before, explained, failing, first_failure, seen, store, summary
 
 PLANTED = '''"""Text 1 + 1."""
 
@@ -151,6 +152,29 @@ def test_a_sample_is_its_seeds_and_grows_at_its_end(tree):
         ast.parse(mutant.of((tree / mutant.file).read_bytes()))
 
 
+def test_a_sample_stays_when_other_lines_change(tree):
+    path = tree / "lib/navfilters/small/planted.py"
+    first = sample(tree, 1, 6)
+    names = [mutant.name for mutant in first]
+    assert len({mutant.name for mutant in sample(tree, 1, 99)}) == 12  # two places of one edit
+    path.write_text("NEW = 1 + 2\n" + PLANTED)
+    assert [mutant.name for mutant in sample(tree, 1, 6)] != names
+    again = sample(tree, 1, 8, drawn=names)
+    assert [mutant.name for mutant in again[:6]] == names
+    assert [m.line for m in again[:6]] == [m.line + (m.file.endswith("planted.py")) for m in first]
+    path.write_text(PLANTED.replace("max(a, b)", "a"))
+    assert all("max" not in mutant.text for mutant in sample(tree, 1, 99, drawn=names))
+
+
+def test_a_report_is_known_to_its_seed(tmp_path):
+    path = tmp_path / "mutants.json"
+    row = {**asdict(planted("+", "-")), "seen_by": "t::a", "tries": 1}
+    assert drawn_before(path, 1) == {}
+    store(path, summary(1, [row]))
+    assert drawn_before(path, 1) == {planted("+", "-").name: row}
+    assert drawn_before(path, 2) == {}
+
+
 def test_tests_that_mirror_a_file_come_first(tree):
     (tree / "tests/small/test_also.py").write_text("from planted import larger, planted\n")
     (tree / "tests/test_far.py").write_text("from navfilters.small.planted import larger\n")
@@ -163,7 +187,9 @@ def test_tests_that_mirror_a_file_come_first(tree):
 def planted(old, new):
     start = PLANTED.index(old, PLANTED.index("if") if old != "1 + 1" else 0)
     line = PLANTED.count("\n", 0, start) + 1
-    return Mutant("lib/navfilters/small/planted.py", line, "", start, start + len(old), old, new)
+    text = PLANTED.splitlines()[line - 1].strip()
+    file, end = "lib/navfilters/small/planted.py", start + len(old)
+    return Mutant(file, line, "", start, end, old, new, text, 0)
 
 
 def test_the_tests_that_run_a_line_are_known_and_their_time(tree, suite):

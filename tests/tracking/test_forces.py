@@ -88,6 +88,12 @@ def test_drag_brakes_against_the_turning_air():
     assert np.abs(push - -rho / 2 * np.hypot(7e3, 1e3) * np.array([0, 7e3, 1e3])).max() < 1e-12
 
 
+def test_drag_is_of_the_air_that_turns_with_the_earth():
+    r, v = np.array([6.6e6, 1e5, 2e5]), np.array([-100.0, 7.5e3, 1e3])
+    braked = replace(POINT, drag=0.02).acceleration(0.0, r, v) - POINT.acceleration(0.0, r, v)
+    assert np.abs(braked - 0.02 * f.drag(r, v, np.array([0.0, 0, 1]))).max() < 1e-14
+
+
 def test_light_pushes_away_from_the_sun_and_not_in_the_shadow():
     sun = np.array([f.UNIT, 0, 0])
     places = np.array([[7e6, 0, 0], [-7e6, 1e6, 0], [-7e6, 6.5e6, 0]])

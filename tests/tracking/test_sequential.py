@@ -77,6 +77,15 @@ def test_a_motion_s_hessian_is_symmetric_and_the_change_of_its_jacobian(real):
     assert not real.sequence.dynamics.at(1).hessian(x).any() or leg.count
 
 
+def test_a_vague_start_is_drawn_as_its_covariance_says(real):
+    """A tenth of a millimetre a second for each metre of position."""
+    starts = real.starts(STARTS, 400)
+    deviations = np.sqrt(np.diagonal(starts.cov, axis1=-2, axis2=-1))
+    assert deviations[:, 0, :6] == pytest.approx(STARTS[:, None] * [1, 1, 1, 1e-4, 1e-4, 1e-4])
+    drawn = (starts.mean[..., :6] - real.first[:6]) / deviations[..., :6]
+    assert drawn.std(axis=1) == pytest.approx(1.0, rel=0.1)
+
+
 def test_numbers_are_the_residuals_of_the_batch(real):
     """At the reference every innovation is the batch's residual."""
     found = real.reference.residuals / real.flight.problem.deviation
