@@ -157,7 +157,7 @@ def blocks_of(name: str, seed: int, inputs: int, done: set[int], module: str) ->
             said = (Path(folder) / "stderr").read_text(errors="replace")[-600:]
             if one.exitcode and now.value < 0:
                 raise RuntimeError(f"{name}: a valid file is not read: {said}")
-            if one.exitcode and late[now.value] != 1:
+            if one.exitcode and (not why or late[now.value] > 1):
                 ended[now.value] = why or f"the interpreter ended with {one.exitcode}: {said}"
 
 
