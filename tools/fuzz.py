@@ -37,12 +37,12 @@ import readers  # noqa: E402
 import valid_files  # noqa: E402
 
 BLOCK = 1000  # inputs that are written down together
-INPUTS = dict.fromkeys(readers.READERS, 130_000)
-INPUTS |= {"leader": 60_000, "image": 60_000, "parquet": 25_000}  # others take longer
-INPUTS |= {"heights": 50_000, "reference": 50_000}
+INPUTS = dict.fromkeys(readers.READERS, 145_000)
+INPUTS |= {"leader": 40_000, "image": 40_000}  # which take longer
+INPUTS |= {"heights": 25_000, "reference": 25_000, "parquet": 10_000}
 SAMPLE = 50  # of so many inputs one has the memory of Python's objects measured
 LONGEST = 10.0  # s, that one input may take, or else again: the clock is another's too
-TRACED = 2000  # inputs that tell which lines are reached
+TRACED = 1000  # inputs that tell which lines are reached
 MIB = 2**20
 MEMORY = "/dev/shm" if Path("/dev/shm").is_dir() else None  # files on a disk take ten times as long
 
