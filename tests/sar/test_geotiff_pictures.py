@@ -139,6 +139,13 @@ def test_files_without_coordinates(tmp_path, scene):
                 read(path)
 
 
+def test_pixels_that_are_nowhere_are_refused(tmp_path, scene):
+    path = write(tmp_path / "a.tif", picture(), -95.0, 30.0, (np.nan, 1e-4))
+    for read in (lambda path: read_terrain(path, PLACE, 9.0), lambda p: read_reference(p, scene)):
+        with pytest.raises(ValueError, match=r"a\.tif must say where .*a geotransform that is not"):
+            read(path)
+
+
 def test_complex_numbers_are_no_picture(tmp_path, scene):
     path = as_file(tmp_path / "a.tif", picture().astype("complex64"))
     with pytest.raises(ValueError, match=r"a\.tif must hold real numbers; found complex64"):

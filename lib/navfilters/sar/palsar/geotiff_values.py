@@ -222,6 +222,10 @@ def _check_pixels(dataset: Any, path: str | Path) -> None:
         )
     if dataset.transform.is_identity:
         raise ValueError(f"{path} must say where its pixels are; found no geotransform")
+    if not np.isfinite(dataset.transform).all():
+        raise ValueError(
+            f"{path} must say where its pixels are; found a geotransform that is not finite"
+        )
     if "complex" in dataset.dtypes[0]:
         raise ValueError(f"{path} must hold real numbers; found {dataset.dtypes[0]}")
     if (colour := dataset.colorinterp[0].name) in ("red", "palette"):
