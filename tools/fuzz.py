@@ -78,8 +78,8 @@ def block(name: str, seed: int, start: int, stop: int, passed: set[int], each: A
     for number in range(start, stop):
         if number in passed:
             continue
-        path.write_bytes(damaged(name, valid, reader.layout, seed, number))
         number_now.value = number
+        path.write_bytes(damaged(name, valid, reader.layout, seed, number))
         before = time.process_time()
         what, fault, peak = tried(reader, path, number, most)
         slowest, memory = max(slowest, time.process_time() - before), max(memory, peak)

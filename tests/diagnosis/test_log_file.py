@@ -91,6 +91,17 @@ def test_parquet_with_other_columns_and_gaps(tmp_path):
     assert log.ignored == ("note",)
 
 
+def test_a_parquet_column_of_no_text_is_refused(tmp_path):
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    table = {"time": [0.0], "innovation_1": [1.0], "S_11": [2], "remark": [1.0]}
+    path = tmp_path / "log.parquet"
+    parquet.write_table(pyarrow.table(table), path, store_schema=False)
+    path.write_bytes(path.read_bytes().replace(b"remark", b"re\xedark"))
+    with pytest.raises(LogError, match=r"log\.parquet: a Parquet file is needed; found: .*utf-8"):
+        read_log(path)
+
+
 def test_a_parquet_column_of_dates_is_refused(tmp_path):
     pyarrow = pytest.importorskip("pyarrow")
     parquet = pytest.importorskip("pyarrow.parquet")

@@ -222,12 +222,13 @@ def _parquet(path: Path) -> dict[str, np.ndarray]:
     parquet = needed("pyarrow.parquet", "pyarrow", "a log in Parquet")
     try:
         table = parquet.read_table(path)
+        names = table.column_names
     except FileNotFoundError:
         raise
     except Exception as error:  # pyarrow raises nearly anything
         raise LogError(f"{path}: a Parquet file is needed; found: {error}") from None
     columns = {}
-    for name in table.column_names:
+    for name in names:
         values = table[name].to_numpy()
         number = values.dtype.kind in "iuf"
         if _used(name) and not number:
