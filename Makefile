@@ -118,8 +118,8 @@ bench: $(BENCH)/.ready $(VENV)/.book  ## measure beside the peers and a C loop; 
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/growth.py
 	env -u OPENBLAS_CORETYPE $(BIN)/python benchmarks/imaging.py
 
-fuzz: $(VENV)/.test  ## the readers of files under much random damage: half an hour
-	NAVFILTERS_FUZZ=20000 $(BIN)/pytest tests/test_fuzzing.py -n 2
+fuzz: $(VENV)/.test  ## a million damaged files for the readers; stopped, it goes on where it was
+	nice $(BIN)/python tools/fuzz.py
 
 faults: $(VENV)/.test  ## full disks, damaged checkpoints, two at once; runs killed at random instants and resumed
 	$(BIN)/pytest tests/runs/test_folder_faults.py tests/runs/test_checkpoints.py

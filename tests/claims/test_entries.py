@@ -96,6 +96,7 @@ def test_a_changed_ledger_is_read_again(ledger):
         ((ENTRY.format(id="ten"), "color = 'red'"), "ten: .*color"),
         (("[[claim]]\nid = 'ten'",), "ten: .*missing"),
         (("[[claim]]\nkind = 'value'",), "an entry without id"),
+        (("\na" + 3000 * ".a" + " = 1",), r"claims.toml must be .*more than 200 dots in line 2"),
     ],
 )
 def test_a_malformed_ledger_is_refused(ledger, texts, message):

@@ -64,6 +64,21 @@ def test_what_is_wrong_with_a_file_is_said(tmp_path, content, message):
     assert str(path) in str(error.value)
 
 
+def test_a_cell_that_does_not_end(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text('time,innovation_1,S_11\n0,"' + 150_000 * "1")
+    with pytest.raises(LogError, match=r"log\.csv: a CSV file .*field larger than field limit"):
+        read_log(path)
+
+
+@pytest.mark.parametrize("number", ["99999999", 5000 * "9"])
+def test_a_channel_of_a_huge_number_takes_no_memory(tmp_path, number):
+    path = tmp_path / "log.csv"
+    path.write_text(f"time,innovation_1,innovation_{number},S_11\n0,1,1,1\n")
+    with pytest.raises(LogError, match=r"log\.csv: column innovation_2 is needed"):
+        read_log(path)
+
+
 def test_parquet_with_other_columns_and_gaps(tmp_path):
     """Whole numbers, text and absent cells, as other programs write them."""
     pyarrow = pytest.importorskip("pyarrow")
@@ -74,6 +89,17 @@ def test_parquet_with_other_columns_and_gaps(tmp_path):
     log = read_log(path)
     assert_array_equal(log.innovation[:, 0], [1.0, np.nan, -1.0])
     assert log.ignored == ("note",)
+
+
+def test_a_parquet_column_of_no_text_is_refused(tmp_path):
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    table = {"time": [0.0], "innovation_1": [1.0], "S_11": [2], "remark": [1.0]}
+    path = tmp_path / "log.parquet"
+    parquet.write_table(pyarrow.table(table), path, store_schema=False)
+    path.write_bytes(path.read_bytes().replace(b"remark", b"re\xedark"))
+    with pytest.raises(LogError, match=r"log\.parquet: a Parquet file is needed; found: .*utf-8"):
+        read_log(path)
 
 
 def test_a_parquet_column_of_dates_is_refused(tmp_path):

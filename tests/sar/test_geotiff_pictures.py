@@ -3,6 +3,7 @@
 import sys
 import warnings
 
+import geotiff_files
 import numpy as np
 import pytest
 from geotiff_bands import (
@@ -152,10 +153,41 @@ def test_files_without_coordinates(tmp_path, scene):
                 read(path)
 
 
+def test_pixels_that_are_nowhere_are_refused(tmp_path, scene):
+    path = write(tmp_path / "a.tif", picture(), -95.0, 30.0, (np.nan, 1e-4))
+    for read in (lambda path: read_terrain(path, PLACE, 9.0), lambda p: read_reference(p, scene)):
+        with pytest.raises(ValueError, match=r"a\.tif must say where .*a geotransform that is not"):
+            read(path)
+
+
 def test_complex_numbers_are_no_picture(tmp_path, scene):
     path = as_file(tmp_path / "a.tif", picture().astype("complex64"))
     with pytest.raises(ValueError, match=r"a\.tif must hold real numbers; found complex64"):
         read_reference(path, scene)
+
+
+def test_a_map_that_leads_nowhere_is_refused(tmp_path, scene):
+    """A plane of an engineer's, with no place on the Earth."""
+    path = as_file(tmp_path / "a.tif", picture(), crs='LOCAL_CS["site",UNIT["metre",1]]')
+    with pytest.raises(ValueError, match=r"a\.tif must have a map that shows .*found site"):
+        read_reference(path, scene)
+
+
+def test_texts_that_are_not_utf_8_are_refused(tmp_path, scene):
+    path = geotiff_files.image(tmp_path / "a.tif", picture(), units="decibel")
+    path.write_bytes(path.read_bytes().replace(b">decibel<", b">d\xe9cibel<"))
+    with pytest.raises(ValueError, match=r"a\.tif must hold its texts in UTF-8; found .*0xe9"):
+        read_reference(path, scene)
+
+
+def test_a_thousand_bands_are_enough(tmp_path, scene):
+    bare = {"driver": "GTiff", "width": 2, "height": 2, "count": 1001, "crs": UTM}
+    at = rasterio.Affine(10, 0, 5e5, 0, -10, 3e6)
+    with rasterio.open(tmp_path / "a.tif", "w", dtype="uint8", transform=at, **bare):
+        pass
+    for read in (lambda path: read_terrain(path, PLACE, 9.0), lambda p: read_reference(p, scene)):
+        with pytest.raises(ValueError, match=r"a\.tif must hold at most 1000 bands; found 1001"):
+            read(tmp_path / "a.tif")
 
 
 def test_files_that_cannot_be_opened(tmp_path):

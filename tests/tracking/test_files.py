@@ -68,7 +68,11 @@ def test_settings_are_found_by_key_and_index(tmp_path):
 
 @pytest.mark.parametrize(
     ("lines", "needed"),
-    [(("a = 1", "b"), "line 2: 'key = value'.*found b"), (("a = 1", "a = 2"), "line 2: .*a again")],
+    [
+        (("a = 1", "b"), "line 2: 'key = value'.*found b"),
+        (("a = 1", "a = 2"), "line 2: .*a again"),
+        ((f"a[{5000 * '1'}] = 1",), "some.txt, line 1: .*at most 9 digits is needed; found 5000"),
+    ],
 )
 def test_a_wrong_setting_is_named_by_file_and_line(tmp_path, lines, needed):
     with pytest.raises(ValueError, match=needed):
@@ -81,6 +85,7 @@ def test_a_wrong_setting_is_named_by_file_and_line(tmp_path, lines, needed):
         (("0 0 1 0", "2 0 x 0"), "line 2: a finite number is needed; found 'x'"),
         (("0 0 1",), "line 1: degree, order, C and S are needed"),
         (("1 2 0 0",), "line 1: an order of at most the degree 1 is needed; found 2"),
+        ((5000 * "2" + " 0 1 0",), "some.txt, line 1: .*at most 9 digits is needed; found 5000"),
         (("0 0 1 0",), "coefficients to degree 2 are needed; found 0"),
     ],
 )

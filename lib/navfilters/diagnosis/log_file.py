@@ -187,7 +187,7 @@ def _csv(path: Path) -> dict[str, np.ndarray]:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = list(csv.reader(file))
-    except UnicodeDecodeError as error:
+    except (UnicodeDecodeError, csv.Error) as error:
         raise LogError(f"{path}: a CSV file in UTF-8 is needed; found {error}") from None
     if not rows:
         raise LogError(f"{path}: a line of column names is needed; found an empty file")
@@ -222,12 +222,13 @@ def _parquet(path: Path) -> dict[str, np.ndarray]:
     parquet = needed("pyarrow.parquet", "pyarrow", "a log in Parquet")
     try:
         table = parquet.read_table(path)
+        names = table.column_names
     except FileNotFoundError:
         raise
     except Exception as error:  # pyarrow raises nearly anything
         raise LogError(f"{path}: a Parquet file is needed; found: {error}") from None
     columns = {}
-    for name in table.column_names:
+    for name in names:
         values = table[name].to_numpy()
         number = values.dtype.kind in "iuf"
         if _used(name) and not number:
@@ -240,10 +241,10 @@ def _block(
     path: Path, columns: Mapping[str, np.ndarray], vector: str, matrix: str
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
     """A vector and its covariance from their columns; None without any."""
-    found = [int(m[2]) for name in columns if (m := _VECTOR.fullmatch(name)) and m[1] == vector]
-    if not found:
+    found = [m for name in columns if (m := _VECTOR.fullmatch(name)) and m[1] == vector]
+    size = len(found)
+    if not size:
         return None, None
-    size = max(found)
     names = [f"{vector}_{i}" for i in range(1, size + 1)]
     _all_of(path, names, columns)
     cov = np.empty((len(columns["time"]), size, size))

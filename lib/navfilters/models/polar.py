@@ -5,11 +5,13 @@ from typing import Any
 
 from navfilters.models.range_bearing import RangeBearing
 from navfilters.numerics.analytic import atan2, hypot
+from navfilters.numerics.doors import takes
 from navfilters.numerics.small_matrices import matmul, vector
 from navfilters.numerics.state_derivatives import first_derivative
 from navfilters.types import Array
 
 
+@takes(x="n")
 def to_polar(x: Array) -> Array:
     """Range and bearing, and their rates, of a place and its velocity.
 
@@ -23,6 +25,7 @@ def to_polar(x: Array) -> Array:
     array (..., 2) or (..., 4)
         (r, b), or with (r', b') behind; rad.
     """
+    _check_size("x", x)
     x1, x2 = x[..., 0], x[..., 1]
     r, b = hypot(x1, x2), atan2(x2, x1)
     if x.shape[-1] == 2:
@@ -31,6 +34,7 @@ def to_polar(x: Array) -> Array:
     return vector([r, b, (x1 * v1 + x2 * v2) / r, (x1 * v2 - x2 * v1) / (r * r)])
 
 
+@takes(p="n")
 def to_cartesian(p: Array) -> Array:
     """The inverse of :func:`to_polar`.
 
@@ -42,12 +46,18 @@ def to_cartesian(p: Array) -> Array:
     -------
     array (..., 2) or (..., 4)
     """
+    _check_size("p", p)
     xp = p.__array_namespace__()
     r, c, s = p[..., 0], xp.cos(p[..., 1]), xp.sin(p[..., 1])
     if p.shape[-1] == 2:
         return vector([r * c, r * s])
     r_rate, turn = p[..., 2], r * p[..., 3]
     return vector([r * c, r * s, r_rate * c - turn * s, r_rate * s + turn * c])
+
+
+def _check_size(name: str, x: Array) -> None:
+    if x.shape[-1] not in (2, 4):
+        raise ValueError(f"{name} must have shape (..., 2) or (..., 4); found {x.shape}")
 
 
 @dataclass(frozen=True, eq=False)

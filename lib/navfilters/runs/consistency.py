@@ -24,7 +24,7 @@ def nees(error: Any, cov: Any) -> np.ndarray:
     error : array (..., n)
         Truth minus estimate.
     cov : array (..., n, n)
-        The covariance that the filter gave it.
+        The covariance that the filter gave it; only the lower triangle is read.
 
     Returns
     -------
@@ -37,9 +37,14 @@ def nees(error: Any, cov: Any) -> np.ndarray:
     e^T P^-1 e = w^T w with L w = e, by the Cholesky factor of P scaled to a unit diagonal, since
     metres stand beside microradians.
     """
-    error = validation.real_array("error", error, "n", finite=False)
-    cov = validation.real_array("cov", cov, "n, n", finite=False)
-    validation.core("cov", cov, error.shape[-1:] * 2)
+    return _square(("error", error), ("cov", cov))
+
+
+def _square(of: tuple[str, Any], by: tuple[str, Any]) -> np.ndarray:
+    """A normalised square, of arguments with the caller's names for them."""
+    error = validation.real_array(*of, "n", finite=False)
+    cov = validation.real_array(*by, "n, n", finite=False)
+    validation.core(by[0], cov, error.shape[-1:] * 2)
     variance = np.diagonal(cov, axis1=-2, axis2=-1)
     scale = 1 / np.sqrt(np.where(variance > 0, variance, np.nan))
     L = cholesky(scale[..., :, None] * cov * scale[..., None, :])
@@ -54,15 +59,16 @@ def nis(innovation: Any, S: Any) -> np.ndarray:
     innovation : array (..., m)
         Measured minus expected.
     S : array (..., m, m)
-        The covariance that the filter gave it. One that was enlarged by underweighting makes the
-        NIS smaller than m on average, even in a consistent filter.
+        The covariance that the filter gave it; only the lower triangle is read. One that was
+        enlarged by underweighting makes the NIS smaller than m on average, even in a consistent
+        filter.
 
     Returns
     -------
     ndarray (...)
         As for :func:`nees`, with m degrees of freedom; NaN where there was no measurement.
     """
-    return nees(innovation, S)
+    return _square(("innovation", innovation), ("S", S))
 
 
 class MeanNees(NamedTuple):

@@ -12,6 +12,7 @@ import numpy as np
 
 from navfilters.numerics import validation
 from navfilters.numerics.analytic import dot
+from navfilters.numerics.doors import takes
 from navfilters.numerics.extras import needed
 from navfilters.types import Array
 
@@ -22,6 +23,7 @@ FLATTENING = 1 / 298.257223563
 _AXES = np.array([SEMI_MAJOR, SEMI_MAJOR, SEMI_MAJOR * (1 - FLATTENING)])
 
 
+@takes(r="3", v="3")
 def body_axes(r: Array, v: Array) -> Array:
     """T_e^b of a body that points at the Earth's centre.
 
@@ -44,6 +46,7 @@ def body_axes(r: Array, v: Array) -> Array:
     local vertical, local horizontal frame; which velocity makes it horizontal is not stated.
     """
     xp = r.__array_namespace__()
+    r, v = (r, v) if r.shape == v.shape else xp.broadcast_arrays(r, v)
     z = -_unit(r)
     y = _unit(xp.linalg.cross(v, r))
     return xp.stack([xp.linalg.cross(y, z), y, z], axis=-2)
@@ -75,6 +78,7 @@ def antenna_axes(look: float, squint: float = 0.0) -> np.ndarray:
     return np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]) @ about_x
 
 
+@takes(r="3", direction="3")
 def ellipsoid_intersection(r: Array, direction: Array) -> Array:
     """Where rays first meet the WGS-84 ellipsoid.
 
@@ -176,9 +180,9 @@ def enu_covariance(deviations: Any, latitude: float, longitude: float) -> np.nda
     ----------
     pogorelsky2020, Eq. (29), whose D is in these axes here.
     """
-    deviations = validation.core(
-        "deviations", validation.real_array("deviations", deviations, "3"), (3,)
-    )
+    deviations = validation.real_array("deviations", deviations, "3")
+    if deviations.shape != (3,):
+        raise ValueError(f"deviations must have shape (3,); found {deviations.shape}")
     T = east_north_up(latitude, longitude)
     D = T.T @ np.diag(deviations**2) @ T
     return (D + D.T) / 2
@@ -209,10 +213,11 @@ def geodetic_to_ecef(latitude: Any, longitude: Any, height: Any = 0.0) -> np.nda
     pogorelsky2020, section "Image geolocation".
     """
     names = ("latitude", "longitude", "height")
-    point = (
+    point = [
         validation.real_array(name, value, "", finite=False)
         for name, value in zip(names, (latitude, longitude, height), strict=True)
-    )
+    ]
+    validation.batch(**{name: value.shape for name, value in zip(names, point, strict=True)})
     return np.stack(_pymap3d().geodetic2ecef(*np.broadcast_arrays(*point)), -1)
 
 

@@ -1,10 +1,12 @@
 """The ellipse that an orbit would follow if there were two bodies from now on."""
 
 from navfilters.numerics.analytic import dot
+from navfilters.numerics.doors import takes
 from navfilters.space.gravity import EARTH, Gravity
 from navfilters.types import Array
 
 
+@takes(x="6")
 def perigee_apogee(x: Array, gravity: Gravity = EARTH) -> tuple[Array, Array]:
     """Heights of the osculating ellipse's perigee and apogee above the equatorial radius.
 

@@ -1,5 +1,6 @@
 """Position, velocity and attitude as one state on a manifold, x = (r, v, q), and its errors."""
 
+from navfilters.numerics.doors import takes
 from navfilters.space.quaternions import (
     conjugate,
     from_rotation_vector,
@@ -10,6 +11,7 @@ from navfilters.space.quaternions import (
 from navfilters.types import Array
 
 
+@takes(x="10", dx="9")
 def retract(x: Array, dx: Array) -> Array:
     """The state that differs by an error: r + dr, v + dv, dq(dmu) (x) q.
 
@@ -34,6 +36,7 @@ def retract(x: Array, dx: Array) -> Array:
     return xp.concat([x[..., :6] + dx[..., :6], q], axis=-1)
 
 
+@takes(x="10", y="10")
 def difference(x: Array, y: Array) -> Array:
     """The error dx with which retract(y, dx) is x.
 

@@ -10,9 +10,11 @@ matrix of a ``Rotation``, which is active, is the transpose: T(q) = Rotation.fro
 """
 
 from navfilters.numerics.analytic import absolute, atan2, dot
+from navfilters.numerics.doors import takes
 from navfilters.types import Array
 
 
+@takes(v="3")
 def cross_matrix(v: Array) -> Array:
     """[v x], with [v x] u = v x u.
 
@@ -36,6 +38,7 @@ def cross_matrix(v: Array) -> Array:
     return xp.reshape(elements, (*x.shape, 3, 3))
 
 
+@takes(p="4", q="4")
 def product(p: Array, q: Array) -> Array:
     """p (x) q: first q, then p.
 
@@ -64,6 +67,7 @@ def product(p: Array, q: Array) -> Array:
     return xp.stack(parts, axis=-1)
 
 
+@takes(q="4")
 def conjugate(q: Array) -> Array:
     """The opposite rotation.
 
@@ -81,6 +85,7 @@ def conjugate(q: Array) -> Array:
     return xp.concat([-q[..., :3], q[..., 3:]], axis=-1)
 
 
+@takes(q="4")
 def normalized(q: Array) -> Array:
     """The quaternion of length one in the direction of q.
 
@@ -97,6 +102,7 @@ def normalized(q: Array) -> Array:
     return q / xp.sqrt(dot(q, q))[..., None]
 
 
+@takes(q="4")
 def matrix(q: Array) -> Array:
     """T(q), the direction cosines that take components from the first to the second frame of q.
 
@@ -128,6 +134,7 @@ def matrix(q: Array) -> Array:
     return xp.reshape(xp.stack(elements, axis=-1), (*x.shape, 3, 3))
 
 
+@takes(theta="3")
 def from_rotation_vector(theta: Array) -> Array:
     """The quaternion of a rotation about the direction of theta, by its length.
 
@@ -161,6 +168,7 @@ def from_rotation_vector(theta: Array) -> Array:
     return xp.concat([ratio * theta, cosine], axis=-1)
 
 
+@takes(q="4")
 def rotation_vector(q: Array) -> Array:
     """The rotation vector of a quaternion, of length 0 to pi; q and -q have the same.
 

@@ -142,7 +142,7 @@ def read_settings(path: Path) -> Settings:
         match = _SETTING.match(line)
         if match is None:
             raise ValueError(f"{where}: 'key = value' or 'key [i] = value' is needed; found {line}")
-        key = match["key"], None if match["index"] is None else int(match["index"])
+        key = match["key"], None if match["index"] is None else _count(match["index"], where)
         if key in values:
             raise ValueError(f"{where}: a key may stand once; found {match['key']} again")
         values[key] = match["value"]
@@ -174,7 +174,7 @@ def read_coefficients(path: Path, degree: int) -> tuple[np.ndarray, np.ndarray]:
         words = line.split()
         if len(words) < 4 or not (words[0].isdecimal() and words[1].isdecimal()):
             raise ValueError(f"{where}: degree, order, C and S are needed; found {line}")
-        n, m = int(words[0]), int(words[1])
+        n, m = (_count(word, where) for word in words[:2])
         if m > n:
             raise ValueError(f"{where}: an order of at most the degree {n} is needed; found {m}")
         last = max(last, n)
@@ -196,6 +196,12 @@ def _lines(path: Path) -> Iterator[tuple[str, str]]:
                 raise ValueError(f"{where}: text in UTF-8 is needed; found {found!r}") from None
             if line and not line.startswith("#"):
                 yield where, line
+
+
+def _count(digits: str, where: str) -> int:
+    if len(digits) > 9:
+        raise ValueError(f"{where}: a number of at most 9 digits is needed; found {len(digits)}")
+    return int(digits)
 
 
 def _number(text: str, where: str) -> float:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from navfilters.numerics.analytic import dot
+from navfilters.numerics.doors import takes
 from navfilters.tracking.harmonics import Harmonics
 from navfilters.tracking.sky import OMEGA, Sky
 from navfilters.types import Array
@@ -47,6 +48,7 @@ _TABLE = np.array(
 )
 
 
+@takes(height="")
 def density(height: Array) -> Array:
     """Of a standard atmosphere, kg/m^3.
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from navfilters.numerics.analytic import atan2, dot
+from navfilters.numerics.doors import takes
 from navfilters.tracking.sky import OMEGA, Sky, geodetic
 from navfilters.types import Array
 
@@ -103,6 +104,7 @@ def observe(state: Array, site: Sites, *, troposphere: bool = True) -> Array:
     return np.stack([distance, azimuth, elevation], axis=-1)
 
 
+@takes(elevation="", height="")
 def refraction(elevation: Array, height: Array) -> Array:
     """By how much the air lifts a satellite, rad.
 
@@ -134,6 +136,7 @@ def refraction(elevation: Array, height: Array) -> Array:
     return np.radians(1.0) / inverse
 
 
+@takes(elevation="", height="")
 def delay(elevation: Array, height: Array) -> Array:
     """By how much the air lengthens the way, m: Saastamoinen's zenith delays, mapped.
 

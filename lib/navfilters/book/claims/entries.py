@@ -6,6 +6,8 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, get_args, get_origin
 
+_DOTS = 200  # in one line: of a key of n tables in tables tomllib's memory grows as n squared
+
 
 class ClaimError(AssertionError):
     """A fresh value that does not give the recorded verdict, or an entry that is not one."""
@@ -28,7 +30,10 @@ def tables(path: Path) -> dict[str, Any]:
         It is no TOML file; naming it.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        if dotted := [n for n, line in enumerate(text.splitlines(), 1) if line.count(".") > _DOTS]:
+            raise ValueError(f"more than {_DOTS} dots in line {dotted[0]}")
+        return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # of TOML, of UTF-8, of brackets in brackets
         raise ClaimError(f"{path} must be a TOML file in UTF-8; found: {error}") from None
 

@@ -8,6 +8,8 @@ import numpy as np
 from navfilters.estimators import catalogue
 from navfilters.estimators.filter import Filter
 from navfilters.models import RangeBearing
+from navfilters.numerics import validation
+from navfilters.numerics.doors import takes
 from navfilters.types import Array, Gaussian
 
 FILTERS: dict[str, Filter] = {
@@ -64,6 +66,7 @@ class Setup:
         return isotropic(self.x0, self.sigma)
 
 
+@takes(mean="n", sigma="")
 def isotropic(mean: Any, sigma: Any) -> Gaussian:
     """A Gaussian that is equally uncertain in every direction.
 
@@ -79,11 +82,11 @@ def isotropic(mean: Any, sigma: Any) -> Gaussian:
     Gaussian
         cov = sigma^2 I, (..., n, n).
     """
-    mean = np.asarray(mean, float)
-    variance = np.asarray(sigma, float)[..., None, None] ** 2
+    variance = sigma[..., None, None] ** 2
     return Gaussian(mean, variance * np.eye(mean.shape[-1]))
 
 
+@takes(x="n", x_true="n")
 def position_error(x: Any, x_true: Any) -> Array:
     """Distance between an estimate and the truth, units.
 
@@ -96,9 +99,10 @@ def position_error(x: Any, x_true: Any) -> Array:
     -------
     array (...)
     """
-    return np.linalg.norm(np.asarray(x) - np.asarray(x_true), axis=-1)
+    return np.linalg.norm(x - x_true, axis=-1)
 
 
+@takes(x_true="n")
 def deviations(estimate: Gaussian, x_true: Any) -> Array:
     """How many of an estimate's own deviations the truth is away from it.
 
@@ -113,8 +117,13 @@ def deviations(estimate: Gaussian, x_true: Any) -> Array:
     array (...)
         The Mahalanobis distance; of an indefinite covariance, the root of the square's size.
     """
-    away = np.asarray(x_true) - estimate.mean
-    weighed = np.linalg.solve(estimate.cov, away[..., None])[..., 0]
+    n = x_true.shape[-1:]
+    mean, cov = (
+        np.asarray(validation.given(f"estimate.{k}", part))
+        for k, part in zip(("mean", "cov"), estimate, strict=True)
+    )
+    away = x_true - validation.core("estimate.mean", mean, n)
+    weighed = np.linalg.solve(validation.core("estimate.cov", cov, 2 * n), away[..., None])[..., 0]
     return np.sqrt(np.abs((away * weighed).sum(axis=-1)))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import fft
 from scipy.ndimage import map_coordinates
 
+from navfilters.numerics.doors import takes
 from navfilters.types import Array
 
 
@@ -138,6 +139,7 @@ class LandCover:
         return map_coordinates(self.reflectivity, where, order=1, mode="nearest")
 
 
+@takes(cosine="")
 def lambert(cosine: Array) -> Array:
     """Backscatter of rough ground at a local incidence angle, 1 at 38.7 degrees.
 

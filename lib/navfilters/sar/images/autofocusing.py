@@ -5,10 +5,12 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from navfilters.numerics.doors import takes
 from navfilters.sar.images.focuser import Focuser
 from navfilters.types import Array
 
 
+@takes(intensity="m, n")
 def sharpness(intensity: Array) -> float:
     """Normalized variance.
 

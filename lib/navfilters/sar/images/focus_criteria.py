@@ -3,9 +3,11 @@
 import numpy as np
 from scipy.special import xlogy
 
+from navfilters.numerics.doors import takes
 from navfilters.types import Array
 
 
+@takes(intensity="m, n")
 def image_entropy(intensity: Array) -> float:
     """Entropy of the shares that pixels have of an image's whole power.
 

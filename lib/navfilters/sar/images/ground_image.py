@@ -6,6 +6,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from navfilters.numerics import validation
+from navfilters.numerics.doors import takes
 from navfilters.sar.images.slant_image import Image
 from navfilters.types import Array
 
@@ -39,6 +40,7 @@ def multilook(image: Image, azimuth: int = 4, in_range: int = 2) -> Array:
     return power.reshape(rows, azimuth, columns, in_range).mean(axis=(1, 3))
 
 
+@takes(power="")
 def decibels(power: Array) -> Array:
     """Logarithmic scale, 10 log10.
 
@@ -57,11 +59,10 @@ def decibels(power: Array) -> Array:
     ValueError
         Nothing above zero.
     """
-    power = np.asarray(power)
     bright = power > 0
     if not bright.any():
         raise ValueError("power must be positive somewhere; found none above zero")
-    return 10 * np.log10(np.where(bright, power, power[bright].min()))
+    return 10 * np.log10(np.where(bright | np.isnan(power), power, power[bright].min()))
 
 
 class GroundImage(NamedTuple):

@@ -4,9 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from navfilters.numerics.doors import takes
 from navfilters.types import Array
 
 
+@takes(r="3", v="3", r_f="3", acceleration="3")
 def effective_velocity(r: Array, v: Array, r_f: Array, acceleration: Array) -> Array:
     """The velocity of the hyperbola that a point's range follows, where the point is closest.
 

@@ -170,9 +170,9 @@ def read_reference(
         raise ValueError(f"unit must be 'dB', 'linear' or None; found {unit!r}")
     with _opened(path) as dataset:
         grid = (west - half * step[0], north + half * step[1]), step, (2 * half + 1, 2 * half + 1)
+        coarser = _pixel(dataset, scene.map) / pixel
         values = _warped(dataset, *grid, "bilinear")
         raw, low, high = _extremes(dataset, *grid)
-        coarser = _pixel(dataset, scene.map) / pixel
         void, zero = _void(dataset, raw, low, high)
         declared = _declared_unit(dataset, path, unit)
     reach = int(np.ceil(coarser - 0.01)) if coarser > 0.99 else 2  # of what is averaged with a void

@@ -30,6 +30,8 @@ _FEET |= dict.fromkeys(("us survey foot", "ftus", "us-ft", "foot_us"), 1200 / 39
 
 _METRES = {"": 1.0} | dict.fromkeys(("m", "metre", "metres", "meter", "meters", "unknown"), 1.0)
 
+_BANDS = 1000  # which GDAL reads together where they are stored so, though only one is wanted
+
 _SHORE = 50.0  # m, that hardly any shore is high on the whole
 
 _STEEP = 10.0  # rise over run that hardly any ground has between neighbouring posts
@@ -198,24 +200,36 @@ def _sound_unit(path: str | Path, values: Array, unit: str | None) -> str:
 def _opened(path: str | Path) -> Iterator[Any]:
     """A rasterio dataset whose pixels have places and hold real numbers."""
     rasterio = _rasterio("rasterio")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
-        dataset = rasterio.open(path)
-    with dataset:
-        if dataset.crs is None:
-            raise ValueError(
-                f"{path} must have a coordinate reference system; found none: not a GeoTIFF, or "
-                "one in radar geometry"
-            )
-        if dataset.transform.is_identity:
-            raise ValueError(f"{path} must say where its pixels are; found no geotransform")
-        if "complex" in dataset.dtypes[0]:
-            raise ValueError(f"{path} must hold real numbers; found {dataset.dtypes[0]}")
-        if (colour := dataset.colorinterp[0].name) in ("red", "palette"):
-            raise ValueError(
-                f"{path} must hold measured values; found a picture in colours: {colour}"
-            )
-        yield dataset
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
+            dataset = rasterio.open(path)
+        with dataset:
+            _check_pixels(dataset, path)
+            yield dataset
+    except UnicodeDecodeError as error:  # of a unit, or of the name of a map
+        raise ValueError(f"{path} must hold its texts in UTF-8; found {error}") from None
+
+
+def _check_pixels(dataset: Any, path: str | Path) -> None:
+    """Refuse a file that does not say where its pixels are, or holds no measured numbers."""
+    if dataset.count > _BANDS:
+        raise ValueError(f"{path} must hold at most {_BANDS} bands; found {dataset.count}")
+    if dataset.crs is None:
+        raise ValueError(
+            f"{path} must have a coordinate reference system; found none: not a GeoTIFF, or "
+            "one in radar geometry"
+        )
+    if dataset.transform.is_identity:
+        raise ValueError(f"{path} must say where its pixels are; found no geotransform")
+    if not np.isfinite(dataset.transform).all():
+        raise ValueError(
+            f"{path} must say where its pixels are; found a geotransform that is not finite"
+        )
+    if "complex" in dataset.dtypes[0]:
+        raise ValueError(f"{path} must hold real numbers; found {dataset.dtypes[0]}")
+    if (colour := dataset.colorinterp[0].name) in ("red", "palette"):
+        raise ValueError(f"{path} must hold measured values; found a picture in colours: {colour}")
 
 
 def _extremes(
