@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from distributed import Client, LocalCluster
 from numpy.testing import assert_array_equal
+from sweeps import LOCAL
 
 from navfilters import FILTERS, Gaussian, SweepError, sweep
 from navfilters.papers.perea2007.experiment import Setup
@@ -58,7 +59,7 @@ def dies_once(folder, prior, z, model):
 @pytest.fixture(scope="module")
 def client():
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": True}
-    with LocalCluster(**options, dashboard_address=":0") as cluster, Client(cluster) as client:
+    with LocalCluster(**options, **LOCAL) as cluster, Client(cluster) as client:
         yield client
 
 
