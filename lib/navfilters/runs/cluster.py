@@ -105,9 +105,8 @@ def _loss_is_told(client: Any, address: str) -> Iterator[None]:
         kinds = OSError | CancelledError | asyncio.CancelledError
         if client.status == "running" and not isinstance(error, kinds):
             raise
-        raise ConnectionError(
-            f"the cluster at {address} has lost this work ({type(error).__name__}: {error})"
-        ) from error
+        why = " ".join(f"{type(error).__name__}: {error}".split())
+        raise ConnectionError(f"the cluster at {address} has lost this work ({why})") from error
 
 
 class _Watch:
