@@ -2,8 +2,8 @@
 
 At a seeded random instant a worker, all workers, the client or the scheduler is lost; or memory
 runs out. What the sweep says is kept; where it ends with an error, the same call goes on with what
-is there then. Every computation of a chunk leaves a mark, so that those made in vain are counted, and
-every chunk that is put into the result is told by ``progress``.
+is there then. Every computation of a chunk leaves a mark, so that those made in vain are counted,
+and every chunk that is put into the result is told by ``progress``.
 """
 
 import argparse
@@ -215,12 +215,12 @@ def main() -> None:
         "configurations": CHUNKS * SIZE,
         "chunks": CHUNKS,
         "memory": {"worker": LIMIT, "much": MUCH, "too_much": TOO_MUCH},
-        "faults": {
-            name: study(name, options.times if fault.strike else TWICE, options.seed)
-            for name, fault in FAULTS.items()
-        },
+        "faults": {},
     }
-    options.store.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    for name, fault in FAULTS.items():
+        times = options.times if fault.strike else TWICE
+        report["faults"][name] = study(name, times, options.seed)
+        options.store.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -95,7 +95,7 @@ def test_a_worker_that_is_lost_on_the_way_is_no_loss(client, tmp_path):
 def test_a_process_that_dies_is_told(tmp_path):
     """And the same call goes on with what was finished."""
     options = {"chunk": 7, "workers": 2, "checkpoint": tmp_path / "sweep"}
-    with pytest.raises(SweepError, match="a process of this sweep has died.*same call goes on"):
+    with pytest.raises(SweepError, match=r"a process of this sweep has died.*same call goes on"):
         quiet(partial(dies_once, str(tmp_path)), priors(), **options)
     got = quiet(partial(dies_once, str(tmp_path)), priors(), **options)
     assert_same(got.final, quiet(EKF, priors()).final)
