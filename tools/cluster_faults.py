@@ -22,7 +22,7 @@ from datetime import date
 from functools import partial
 from pathlib import Path
 from socket import socket
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any, NamedTuple
 
 import dask
@@ -183,22 +183,35 @@ def trial(fault: Fault, place: Path, seconds: float) -> dict[str, Any]:
     return {**row, "in_vain": len(marks) - len(set(marks)), "chunks": len(set(marks))}
 
 
-def study(name: str, times: int, seed: int) -> list[dict[str, Any]]:
-    """So many trials of a fault. One that struck after the end is made again."""
-    draw, rows = random.Random(f"{name} {seed}"), []
-    with TemporaryDirectory() as folder:
-        swept(Path(folder) / "whole", workers=1)
-        whole = left(Path(folder) / "whole")
-        while len(rows) < times:
-            place = Path(folder) / f"{len(rows)} {time.monotonic()}"
-            row = trial(FAULTS[name], place, round(draw.uniform(0.0, CHUNKS * SECONDS / 2), 3))
-            row["same"] = left(place) == whole
+class Study:
+    """Trials of a fault, one after the other.
+
+    Parameters
+    ----------
+    name : str
+    seed : int
+    folder : Path
+    """
+
+    def __init__(self, name: str, seed: int, folder: Path) -> None:
+        self.name, self.draw = name, random.Random(f"{name} {seed}")
+        self.folder, self.whole = folder / name, folder / "whole"
+        self.folder.mkdir()
+
+    def trial(self) -> dict[str, Any]:
+        """The next. One that struck after the end of the sweep is made again."""
+        if not self.whole.exists():
+            swept(self.whole, workers=1)
+        row = {"struck": False}
+        while not row.pop("struck"):
+            place = Path(mkdtemp(dir=self.folder))
+            instant = round(self.draw.uniform(0.0, CHUNKS * SECONDS / 2), 3)
+            row = trial(FAULTS[self.name], place, instant)
+            row["same"] = left(place) == left(self.whole)
             row["said"] = row["said"].replace(str(place), "FOLDER")
-            sys.stdout.write(f"{name}, {row}\n")
+            sys.stdout.write(f"{self.name}, {row}\n")
             sys.stdout.flush()
-            if row.pop("struck"):
-                rows.append(row)
-    return rows
+        return row
 
 
 def main() -> None:
@@ -217,10 +230,13 @@ def main() -> None:
         "memory": {"worker": LIMIT, "much": MUCH, "too_much": TOO_MUCH},
         "faults": {},
     }
-    for name, fault in FAULTS.items():
-        times = options.times if fault.strike else TWICE
-        report["faults"][name] = study(name, times, options.seed)
-        options.store.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    with TemporaryDirectory() as folder:
+        studies = {name: Study(name, options.seed, Path(folder)) for name in FAULTS}
+        for turn in range(options.times):
+            for name, study in studies.items():
+                if turn < TWICE or FAULTS[name].strike:
+                    report["faults"].setdefault(name, []).append(study.trial())
+            options.store.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -5,9 +5,9 @@ import pytest
 
 
 @pytest.mark.slow
-def test_a_killed_worker_and_a_closed_client_leave_the_same_bytes():
+def test_a_killed_worker_and_a_closed_client_leave_the_same_bytes(tmp_path):
     for name in ("one worker killed", "client closed"):
-        (row,) = cluster_faults.study(name, 1, seed=3)
+        row = cluster_faults.Study(name, 3, tmp_path).trial()
         assert row["same"]
         assert row["told"] == cluster_faults.CHUNKS * cluster_faults.SIZE
         assert row["chunks"] == cluster_faults.CHUNKS
