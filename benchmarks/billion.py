@@ -181,7 +181,6 @@ def measure(client: Client) -> dict[str, Any]:
         "date": f"{date.today()}",
         "system": f"{platform.system()}, Python {platform.python_version()}, distributed "
         f"{distributed.__version__}, {os.cpu_count()} cores",
-        "worker_mb_idle": round(max(client.run(peak).values())),
         "chunks": of_chunks(client),
         "shards": of_shards(client),
         "members": MEMBERS,
