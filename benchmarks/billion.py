@@ -49,7 +49,12 @@ def starts(number: int, members: int) -> Gaussian:
     return Gaussian(mean, BASE.prior.cov)
 
 
-def shard(number: int, members: int, steps: int, engine: str = "numpy") -> tuple[int, np.ndarray]:
+def shard(
+    number: int,
+    members: int,
+    steps: int,
+    engine: str = "numpy",
+) -> tuple[int, np.ndarray]:
     """Its number, and how many of its members end in each class."""
     problem = FILTERS["EKF"], starts(number, members), BASE.z, BASE.model, steps
     final = sweep(*problem, engine=engine, workers=1, progress=False).final
@@ -59,7 +64,7 @@ def shard(number: int, members: int, steps: int, engine: str = "numpy") -> tuple
 
 def study(client: Client, folder: Path, shards: int, **options: Any) -> np.ndarray:
     """The counts of all shards, of which those in the folder are not computed again."""
-    job = repr((shards, sorted(options.items())))
+    job = repr(sorted(options.items()))
     folder.mkdir(parents=True, exist_ok=True)
     total, missing = np.zeros(len(EDGES) - 1, dtype=int), []
     for number in range(shards):

@@ -5,16 +5,20 @@ import pytest
 
 
 @pytest.mark.slow
-def test_a_killed_worker_and_a_closed_client_leave_the_same_bytes(tmp_path):
-    for name in ("one worker killed", "client closed"):
-        row = cluster_faults.Study(name, 3, tmp_path).trial()
-        assert row["same"]
-        assert row["told"] == cluster_faults.CHUNKS * cluster_faults.SIZE
-        assert row["chunks"] == cluster_faults.CHUNKS
-        assert row["said"].startswith("ConnectionError: sweep stopped") == (name == "client closed")
+def test_a_killed_worker_leaves_the_same_bytes(tmp_path):
+    row = cluster_faults.Study("one worker killed", 3, tmp_path).trial()
+    assert row["same"]
+    assert row["said"] == ""
+    assert row["told"] == cluster_faults.CHUNKS * cluster_faults.SIZE
+    assert row["chunks"] == cluster_faults.CHUNKS
 
 
-def test_what_is_left_tells_other_bytes_and_not_another_place(tmp_path):
+@pytest.fixture
+def quick(monkeypatch):
+    monkeypatch.setattr(cluster_faults, "SECONDS", 0.0)
+
+
+def test_what_is_left_tells_other_bytes_and_not_another_place(quick, tmp_path):
     for place in ("one", "two"):
         cluster_faults.swept(tmp_path / place, workers=1)
     one, two = (cluster_faults.left(tmp_path / place) for place in ("one", "two"))
@@ -23,7 +27,7 @@ def test_what_is_left_tells_other_bytes_and_not_another_place(tmp_path):
     assert cluster_faults.left(tmp_path / "two") != one
 
 
-def test_every_computation_leaves_its_mark(tmp_path):
+def test_every_computation_leaves_its_mark(quick, tmp_path):
     row = cluster_faults.swept(tmp_path / "one", workers=1)
     assert row == {"said": "", "told": cluster_faults.CHUNKS * cluster_faults.SIZE}
     marks = (tmp_path / "one" / "marks").read_text().split()
