@@ -166,12 +166,19 @@ def written(dask_worker: Any) -> int:
 def trial(fault: Fault, place: Path, seconds: float) -> dict[str, Any]:
     """A sweep that meets a fault, and the same call again if it ended with an error."""
     with fault.cluster() as client:
-        timer = threading.Timer(seconds, fault.strike or bool, [client])
+        struck = threading.Event()
+
+        def strike() -> None:
+            struck.set()
+            if fault.strike:
+                fault.strike(client)
+
+        timer = threading.Timer(seconds, strike)
         timer.start()
         begun = time.perf_counter()
         row = swept(place, fault.mib, client=client)
         row["seconds"] = round(time.perf_counter() - begun, 1)
-        row["struck"] = fault.strike is None or not timer.is_alive()
+        row["struck"] = fault.strike is None or struck.is_set()
         timer.cancel()
         timer.join()
         row["spilled"] = sum(client.run(written).values()) if not fault.strike else 0
