@@ -7,7 +7,7 @@ BUILT := _build/.complete
 BENCH := .venv-bench
 TOOLS := _build/dist-tools/bin
 SOURCES := $(shell find book lib -type f -not -path '*/__pycache__/*' -not -name '.*' -not -path '*/thumbnails/*' 2>/dev/null) \
-	_config.yml _toc.yml requirements.txt $(wildcard benchmarks/*.json) tools/execute_notebooks.py tools/executed.py tools/thumbnails.py \
+	_config.yml _toc.yml requirements.txt $(wildcard benchmarks/*.json) benchmarks/billion.py tools/execute_notebooks.py tools/executed.py tools/thumbnails.py \
 	tools/book_pages.py tools/icons.js tools/search-order.js tools/downloads.py
 
 # Everything runs in .venv, with .venv's settings: what the shell has of packages (ROS sets PYTHONPATH),
