@@ -91,7 +91,9 @@ def test_a_chunk_that_kills_its_workers_is_named():
 @pytest.mark.slow
 def test_workers_that_all_leave_are_not_waited_for_for_ever(threads, tmp_path):
     options = {"client": threads, "checkpoint": tmp_path}
-    with pytest.raises(TimeoutError, match=r"found none at .* finished; they are in"):
+    with pytest.raises(
+        TimeoutError, match=r"none at .* gone\. .* smaller chunk .* finished; they are in"
+    ):
         swept(400, progress=lambda _: threads.cluster.scale(0), **options)
     threads.cluster.scale(1)
     assert_same(swept(400, **options).final, swept(400).final)

@@ -170,9 +170,11 @@ class _Watch:
                 f"{self.address} could not for {PATIENCE:g} s: a worker pauses while its memory is "
                 "full. Use a smaller chunk or give each worker more memory"
             )
+        why = "Where they may take longer, call client.wait_for_workers(1) first"
+        if self.lost:
+            why = f"The {self.lost} that it had are gone. {REMEDY}"
         raise TimeoutError(
-            f"client must have workers; found none at {self.address} after {PATIENCE:g} s. Where "
-            "they may take longer, call client.wait_for_workers(1) first"
+            f"client must have workers; found none at {self.address} after {PATIENCE:g} s. {why}"
         )
 
 
