@@ -7,7 +7,7 @@ BUILT := _build/.complete
 BENCH := .venv-bench
 TOOLS := _build/dist-tools/bin
 SOURCES := $(shell find book lib -type f -not -path '*/__pycache__/*' -not -name '.*' -not -path '*/thumbnails/*' 2>/dev/null) \
-	_config.yml _toc.yml requirements.txt $(wildcard benchmarks/*.json) tools/execute_notebooks.py tools/executed.py tools/thumbnails.py \
+	_config.yml _toc.yml requirements.txt $(wildcard benchmarks/*.json) benchmarks/billion.py tools/execute_notebooks.py tools/executed.py tools/thumbnails.py \
 	tools/book_pages.py tools/icons.js tools/search-order.js tools/downloads.py
 
 # Everything runs in .venv, with .venv's settings: what the shell has of packages (ROS sets PYTHONPATH),
@@ -112,18 +112,20 @@ dist: $(VENV)/.book  ## wheel and sdist in _build/dist, checked and installed in
 serve: $(VENV)/.book  ## the book at http://localhost:8000, built again when a page changes
 	$(BIN)/python tools/serve.py
 
-bench: $(BENCH)/.ready $(VENV)/.book  ## measure beside the peers and a C loop; store the results in benchmarks/
+bench: $(BENCH)/.ready $(VENV)/.test  ## measure beside the peers and a C loop; store the results in benchmarks/
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/run.py
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/batches.py
 	env -u OPENBLAS_CORETYPE $(BENCH)/bin/python benchmarks/growth.py
 	env -u OPENBLAS_CORETYPE $(BIN)/python benchmarks/imaging.py
+	env -u OPENBLAS_CORETYPE $(BIN)/python benchmarks/billion.py --measure
 
 fuzz: $(VENV)/.test  ## a million damaged files for the readers; stopped, it goes on where it was
 	nice $(BIN)/python tools/fuzz.py
 
-faults: $(VENV)/.test  ## full disks, damaged checkpoints, two at once; runs killed at random instants and resumed
-	$(BIN)/pytest tests/runs/test_folder_faults.py tests/runs/test_checkpoints.py
+faults: $(VENV)/.test  ## full disks, damaged checkpoints, two at once; runs killed and resumed; clusters that fail
+	$(BIN)/pytest tests/runs/test_folder_faults.py tests/runs/test_checkpoints.py tests/runs/test_cluster.py
 	nice $(BIN)/python tools/kills.py
+	nice $(BIN)/python tools/cluster_faults.py
 
 shuffled: $(VENV)/.test  ## the quick unit tests in a random order, which is told and can be repeated
 	PYTHONPATH="$(CURDIR)/tools" $(BIN)/pytest tests --ignore tests/book -n 2 -m "not slow" -p shuffled

@@ -13,6 +13,8 @@ BASE = Setup()
 MODEL = BASE.model
 EKF = FILTERS["EKF"]
 quiet = partial(sweep, progress=False)
+LOCAL = {"protocol": "tcp", "host": "127.0.0.1", "dashboard_address": ":0"}
+"""A LocalCluster that asks for no other address of this machine, which would need a network."""
 
 
 def priors(count=11, seed=0):

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from distributed import Client, LocalCluster
 from numpy.testing import assert_array_equal
+from sweeps import LOCAL
 
 from navfilters import FILTERS, Gaussian, SweepError, sweep
 from navfilters.papers.perea2007.experiment import Setup
-from navfilters.runs import records
+from navfilters.runs import cluster, records
 from navfilters.runs import workers as places
 
 BASE = Setup()
@@ -110,14 +111,14 @@ def test_an_interruption_gives_no_result(monkeypatch):
 def empty():
     """A cluster whose workers have not come."""
     options = {"n_workers": 0, "threads_per_worker": 1, "processes": False}
-    with LocalCluster(**options, dashboard_address=":0") as cluster, Client(cluster) as client:
+    with LocalCluster(**options, **LOCAL) as cluster, Client(cluster) as client:
         yield client
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 60])
 def test_a_cluster_that_stays_empty_is_an_error(empty, count, monkeypatch, capsys):
-    monkeypatch.setattr(places, "PATIENCE", 0.5)
+    monkeypatch.setattr(cluster, "PATIENCE", 0.5)
     with pytest.raises(TimeoutError, match=r"client must have workers; found none at .* 0.5 s"):
         quiet(EKF, priors(count), chunk=20, client=empty)
     said = capsys.readouterr().err

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from distributed import Client, LocalCluster
 from numpy.testing import assert_array_equal
+from sweeps import LOCAL
 
 from navfilters import FILTERS, Gaussian, SweepError, sweep
 from navfilters.papers.perea2007.experiment import Setup
@@ -58,7 +59,7 @@ def dies_once(folder, prior, z, model):
 @pytest.fixture(scope="module")
 def client():
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": True}
-    with LocalCluster(**options, dashboard_address=":0") as cluster, Client(cluster) as client:
+    with LocalCluster(**options, **LOCAL) as cluster, Client(cluster) as client:
         yield client
 
 
@@ -89,6 +90,15 @@ def test_a_worker_that_is_lost_on_the_way_is_no_loss(client, tmp_path):
     assert_same(got.final, quiet(EKF, priors()).final)
     client.wait_for_workers(2)
     assert len(set(client.run(os.getpid).values()) - set(before.values())) == 1
+
+
+def test_a_process_that_dies_is_told(tmp_path):
+    """And the same call goes on with what was finished."""
+    options = {"chunk": 7, "workers": 2, "checkpoint": tmp_path / "sweep"}
+    with pytest.raises(SweepError, match=r"a process of this sweep has died.*same call goes on"):
+        quiet(partial(dies_once, str(tmp_path)), priors(), **options)
+    got = quiet(partial(dies_once, str(tmp_path)), priors(), **options)
+    assert_same(got.final, quiet(EKF, priors()).final)
 
 
 # --- exceptions ---------------------------------------------------------------------------------

@@ -22,6 +22,7 @@ from navfilters.runs import model_checks
 from navfilters.runs import workers as places
 from navfilters.runs.checkpoints import Checkpoint
 from navfilters.runs.chunks import SweepError, compute
+from navfilters.runs.cluster import on_cluster
 from navfilters.runs.locked_folder import alone_in
 from navfilters.runs.march import Chunk, Job, Kept
 from navfilters.runs.problems import WORTH_A_PROCESS, Problem, first_step
@@ -125,14 +126,18 @@ def sweep(
         An estimator that is none.
     SweepError
         The filter or the model raised an exception; names the configuration. Or a chunk whose
-        result is missing, or is not of the shape and type of the first configuration's.
+        workers died one after the other, whose result is missing, or is not of the shape and type
+        of the first configuration's.
     TimeoutError
-        A cluster without workers.
+        A cluster that for half a minute has no workers, or none whose memory is not full.
+    ConnectionError
+        A cluster whose scheduler is gone, or a client that was closed.
     OSError
         A checkpoint folder that cannot be written, or in which another process is at work
         (BlockingIOError).
     KeyboardInterrupt
-        Says how many configurations were finished, and whether they can be used.
+        Says, as the two errors of a cluster do, how many configurations were finished, and whether
+        they can be used.
 
     Notes
     -----
@@ -202,7 +207,7 @@ def _place(
 ) -> Callable[..., Iterator[Any]]:
     """Where the chunks are computed."""
     if client is not None:
-        return partial(places.on_cluster, client=client)
+        return partial(on_cluster, client=client)
     if workers is None:
         workers = _default_workers(job.engine, problem.count * job.steps)
     if workers == 1:
@@ -278,11 +283,12 @@ def _fill(
                     if store:
                         store.save(number, kept)
                     bar.update(results.put(problem.chunk(number, size), kept))
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, ConnectionError, TimeoutError) as stop:
             where = "without a checkpoint folder they are lost"
             if store:
                 where = f"they are in {store.folder}, and the same call goes on from there"
-            raise KeyboardInterrupt(
-                f"sweep stopped: {results.finished} of {problem.count} configurations were "
+            why = f"{stop}. " * bool(str(stop))
+            raise type(stop)(
+                f"sweep stopped: {why}{results.finished} of {problem.count} configurations were "
                 f"finished; {where}"
-            ) from None
+            ) from stop.__cause__
