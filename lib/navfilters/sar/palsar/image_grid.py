@@ -122,11 +122,12 @@ def _check_dates(headers: Headers, good: np.ndarray, days: np.ndarray, late: np.
 
     What each line's clock is ahead of even steps (n,) is in s.
     """
-    jumps = np.r_[False, np.abs(np.diff(late)) > _DAY / 2]
-    k = int(np.argmax(jumps))
-    in_day = headers.values["millisecond of day"][good[k]] * _TICK
-    due = date.fromordinal(int(days[k] + (in_day - late[k] + late[max(k - 1, 0)]) // _DAY))
-    if jumps.any() and due.toordinal() != days[k]:
+    step = np.r_[0.0, np.diff(late)]
+    off = np.rint(step / _DAY)
+    jumps = (off != 0) & (np.abs(step - off * _DAY) <= 2 * _TICK)
+    if jumps.any():
+        k = int(np.argmax(jumps))
+        due = date.fromordinal(int(days[k] - off[k]))
         name, value = "day of year", due.timetuple().tm_yday
         if headers.values["year"][good[k]] != due.year:
             name, value = "year", due.year
