@@ -1,9 +1,13 @@
 """Frames of one pass as one product: all but the cut is as in a file that was never cut."""
 
+import re
 import tracemalloc
+import warnings
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from palsar_files import (
     LENGTH,
@@ -228,3 +232,37 @@ def test_codes_of_more_than_five_bits_are_told_of_their_file(tmp_path):
     got = open_frames(strip(tmp_path, (0, 120), (90, 200), codes=codes))
     with pytest.warns(UserWarning, match=r"IMG-HH-.*0680.*: 2 values of lines 140 to 159"):
         got.read(140, 160)
+
+
+def test_a_pass_over_the_equator_has_two_orbit_numbers(tmp_path):
+    """An orbit begins there: no reason to refuse frames that overlap."""
+    folders = strip(tmp_path, (0, 120), (90, 200))
+    write(folders[1], 1, frame_bytes(90, 200), leader_bytes(summary=[(444, "A8", "23095")]))
+    assert open_frames(folders).lines == ALL
+
+
+SECOND = frame_bytes(90, 200)
+HEADS = st.integers(0, 720 + 412) | st.integers(1, 109).map(lambda n: 720 + n * LENGTH + n % 128)
+
+
+@pytest.fixture(scope="module")
+def damaged(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("strip")
+    return folder, write(folder, 0, frame_bytes(0, 120))
+
+
+@settings(max_examples=60)
+@given(where=HEADS | st.integers(0, len(SECOND) - 1), byte=st.integers(0, 255))
+def test_any_byte_of_a_later_frame_may_be_wrong(damaged, where, byte):
+    """Either a product that can be read, or an error that says what must be."""
+    folder, _ = damaged
+    image = bytearray(SECOND)
+    image[where] = byte
+    write(folder, 1, bytes(image))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        try:
+            got = open_frames(folder)
+            assert got.read(0, got.lines).shape == (got.lines, got.samples)
+        except ValueError as error:
+            assert re.search(r"must .*; found", str(error)), error  # noqa: PT017

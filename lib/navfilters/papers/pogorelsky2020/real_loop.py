@@ -126,8 +126,9 @@ def real_table(product: Product, patches: Sequence[Patch], outcome: Outcome) -> 
         inliers or why there is no measurement; then by axis the root mean square over the runs of
         the position's error, and what the filter believed of it.
     """
+    fewer = ": its lines hold no more, longer strips do" if len(patches) < UPDATES else ""
     lines = [
-        f"{product.name}, {product.day}, {len(patches)} of {UPDATES} patches",
+        f"{product.name}, {product.day}, {len(patches)} of {UPDATES} patches{fewer}",
         f"{'image':>5}{'time (UTC)':>15}{'Doppler':>11}{'missing lines':>18}",
     ]
     for k, patch in enumerate(patches, start=1):
