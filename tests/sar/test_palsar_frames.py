@@ -77,7 +77,7 @@ def test_one_folder_may_hold_all_frames_and_both_polarisations(tmp_path):
     with pytest.raises(ValueError, match=r"found .*0670.*, .*0680.*open_frames joins frames"):
         open_product(tmp_path, polarisation="HH")
     next(tmp_path.glob("LED-*0680*")).unlink()
-    with pytest.raises(ValueError, match=r"IMG-HH-\.\.\.; found .*0670.*, .*0680"):
+    with pytest.raises(ValueError, match=r"LED-\.\.\. of each scene; found none of IMG-H.*0680"):
         open_frames(tmp_path, polarisation="HH")
 
 

@@ -149,14 +149,13 @@ def scenes(folder: Path, polarisation: str | None) -> list[tuple[Path, Path]]:
     """
     files = _listed(folder)
     leaders = _of_product(files, "LED-")
-    names = [path.name[4:] for path in leaders] if len(leaders) > 1 else [""]
-    found = [_files(folder, polarisation, name) for name in names]
-    ends = tuple(leader.name.upper()[3:] for _, leader in found)
+    ends = tuple(path.name.upper()[3:] for path in leaders)
     for image in _of_product(files, "IMG-"):
-        if not image.name.upper().endswith(ends):
+        if leaders and not image.name.upper().endswith(ends):
             needed = f"{folder} must hold a leader file LED-... of each scene"
             raise ValueError(f"{needed}; found none of {image.name}")
-    return found
+    names = [path.name[4:] for path in leaders] if len(leaders) > 1 else [""]
+    return [_files(folder, polarisation, name) for name in names]
 
 
 def _listed(folder: Path, scene: str = "") -> list[Path]:
