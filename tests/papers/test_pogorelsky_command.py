@@ -40,20 +40,20 @@ def test_the_command_navigates(folder, capsys, monkeypatch):
 
 
 def test_options_reach_the_reader(monkeypatch, capsys):
-    def opening(folder, **options):
-        raise ValueError(f"{folder} {options}")
+    def opening(folders, **options):
+        raise ValueError(f"{' '.join(folders)} {options}")
 
-    monkeypatch.setattr(real_loop, "open_product", opening)
+    monkeypatch.setattr(real_loop, "open_frames", opening)
     options = "--polarisation HV --records 5 900 --clock-offset -0.002"
     with pytest.raises(SystemExit) as ended:
-        command.main(f"--closed-loop --palsar A --dem B --reference C {options}".split())
+        command.main(f"--closed-loop --palsar A E --dem B --reference C {options}".split())
     assert ended.value.code == (
-        "A {'polarisation': 'HV', 'records': [5, 900], 'clock_offset': -0.002}"
+        "A E {'polarisation': 'HV', 'records': [5, 900], 'clock_offset': -0.002}"
     )
 
 
 def test_the_unit_of_the_reference_reaches_its_reader(monkeypatch, capsys):
-    monkeypatch.setattr(real_loop, "open_product", lambda folder, **options: None)
+    monkeypatch.setattr(real_loop, "open_frames", lambda folders, **options: None)
 
     def cutting(product, elevation, reference, **options):
         raise ValueError(f"{elevation} {reference} {options['unit']} {options['geoid']}")

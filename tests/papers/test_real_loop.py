@@ -74,7 +74,9 @@ BLIND = replace(SMALL, reach=10.0, steps=(16.0,))
 @pytest.mark.slow
 def test_a_climb_without_a_peak_is_reported(product, patches):
     outcome = run_filter(product, patches[:1], CASES["TC-2"], 1, imaging=BLIND)
-    assert "no image: the climb ended at a limit" in table(product, patches[:1], outcome)
+    text = table(product, patches[:1], outcome)
+    assert "no image: the climb ended at a limit" in text
+    assert "1 of 3 patches: its lines hold no more, longer strips do\n" in text
 
 
 @pytest.mark.slow

@@ -245,6 +245,7 @@ def test_half_the_band_makes_images_of_the_same_ground(folder, narrow):
     """Half as many looks in range: with those of the full band a cell would be twice as long."""
     cut = fitted(SMALL, narrow)
     assert (cut.looks, cut.samples, cut.lines) == ((2, 1), 128, 384)
+    assert_allclose((cut.radar.sampling, cut.radar.bandwidth), (16e6, 14e6))
     assert fitted(cut, narrow) is cut
     patches = cut_patches(narrow, folder / "dem.tif", folder / "reference.tif", imaging=SMALL)
     assert len(patches) == 1

@@ -36,6 +36,7 @@ from palsar_products import (
 )
 
 from navfilters.sar.palsar.__main__ import main
+from navfilters.sar.palsar.frames import open_frames
 from navfilters.sar.palsar.opening import open_product
 
 
@@ -75,8 +76,9 @@ def test_what_other_programs_leave_beside_the_files_hides_nothing(tmp_path, besi
         own = LEADER if name.startswith("LED") else IMAGE
         marked = name.startswith(("IMG-HH-{}", "LED-{}", "._"))
         (tmp_path / name.format(NAME)).write_bytes(own if copy and marked else b"<PAMDataset/>")
-    got = open_product(tmp_path, **options)
-    assert (got.image.name, got.leader.name) == (f"IMG-HH-{NAME}", f"LED-{NAME}")
+    for got in (open_product(tmp_path, **options), open_frames(tmp_path, **options)):
+        assert (got.image.name, got.leader.name) == (f"IMG-HH-{NAME}", f"LED-{NAME}")
+        assert got.lines == LINES
 
 
 def test_two_scenes_whose_names_begin_alike_are_two(tmp_path):

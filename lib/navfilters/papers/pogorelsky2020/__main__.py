@@ -35,7 +35,11 @@ def _add_product(parser: argparse.ArgumentParser) -> None:
     """What says where the product is and how to read it; None where it is not given."""
     group = parser.add_argument_group("the closed loop on an ALOS PALSAR level-1.0 product")
     group.add_argument(
-        "--palsar", metavar="FOLDER", help="with IMG-... and LED-...; 1 run by default"
+        "--palsar",
+        metavar="FOLDER",
+        nargs="+",
+        help="with IMG-... and LED-...: consecutive frames of one pass, there or in several "
+        "folders, are joined; 1 run by default",
     )
     group.add_argument("--dem", metavar="FILE", help="GeoTIFF of heights, m")
     group.add_argument(

@@ -122,7 +122,7 @@ def fitted(imaging: Imaging, product: Product) -> Imaging:
         radar=replace(
             imaging.radar,
             sampling=product.sampling_rate,
-            bandwidth=min(imaging.radar.bandwidth, product.sampling_rate),
+            bandwidth=abs(product.chirp_rate) * product.pulse_length,
         ),
         looks=(azimuth, round(looks * fewer)),
         samples=round(imaging.samples * fewer),

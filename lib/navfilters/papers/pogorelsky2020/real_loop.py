@@ -18,7 +18,7 @@ from navfilters.papers.pogorelsky2020.real_images import RealAttempt as Attempt
 from navfilters.papers.pogorelsky2020.real_images import RealImages
 from navfilters.papers.pogorelsky2020.real_patches import Patch, cut_patches
 from navfilters.papers.pogorelsky2020.true_flight import Truth
-from navfilters.sar.palsar.opening import open_product
+from navfilters.sar.palsar.frames import open_frames
 from navfilters.sar.palsar.product import Product
 from navfilters.space.frames import antenna_axes, body_axes
 
@@ -126,8 +126,9 @@ def real_table(product: Product, patches: Sequence[Patch], outcome: Outcome) -> 
         inliers or why there is no measurement; then by axis the root mean square over the runs of
         the position's error, and what the filter believed of it.
     """
+    fewer = ": its lines hold no more, longer strips do" if len(patches) < UPDATES else ""
     lines = [
-        f"{product.image.name}, {product.day}, {len(patches)} of {UPDATES} patches",
+        f"{product.name}, {product.day}, {len(patches)} of {UPDATES} patches{fewer}",
         f"{'image':>5}{'time (UTC)':>15}{'Doppler':>11}{'missing lines':>18}",
     ]
     for k, patch in enumerate(patches, start=1):
@@ -173,7 +174,7 @@ def _found(attempt: Attempt, patches: Sequence[Patch]) -> str:
 
 
 def report(
-    folder: str | Path,
+    folders: str | Path | Sequence[str | Path],
     elevation: str | Path,
     reference: str | Path,
     case: Setup | str = "TC-1",
@@ -190,8 +191,8 @@ def report(
 
     Parameters
     ----------
-    folder : str or Path
-        Of the product.
+    folders : str or Path, or sequence of them
+        Of the product, or of the frames that are joined.
     elevation, reference : str or Path
         GeoTIFF files.
     case : {"TC-1", "TC-2"} or Setup
@@ -205,7 +206,7 @@ def report(
     progress : callable
         Wraps the iterable of images.
     **options
-        To ``navfilters.sar.palsar.opening.open_product``.
+        To ``navfilters.sar.palsar.frames.open_frames``.
 
     Returns
     -------
@@ -214,9 +215,9 @@ def report(
     Raises
     ------
     ValueError, OSError, ImportError
-        As ``open_product`` and ``cut_patches``.
+        As ``open_frames`` and ``cut_patches``.
     """
-    setup, product = of_case(case), open_product(folder, **options)
+    setup, product = of_case(case), open_frames(folders, **options)
     patches = cut_patches(
         product, elevation, reference, setup=setup, imaging=imaging, geoid=geoid, unit=unit
     )

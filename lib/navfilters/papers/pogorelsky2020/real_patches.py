@@ -149,7 +149,7 @@ def _sizes(product: Product, setup: Setup, imaging: Imaging) -> _Sizes:
     if ranges > product.samples:
         raise ValueError(
             f"product must have {ranges} samples in a line for patches of {imaging.samples}; "
-            f"found {product.samples} in {product.image}"
+            f"found {product.samples} in {product.name}"
         )
     column = (product.samples - ranges) // 2
     return _Sizes(bandwidth, imaging.lines + 2 * half, column, ranges)

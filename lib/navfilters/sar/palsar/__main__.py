@@ -1,4 +1,4 @@
-"""What a PALSAR product holds: ``python -m navfilters.sar.palsar.product FOLDER``."""
+"""What a file of a PALSAR product holds: ``python -m navfilters.sar.palsar FILE``."""
 
 import argparse
 import sys
@@ -10,7 +10,7 @@ from navfilters.sar.palsar.contents import contents
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Print what a file holds: ``python -m navfilters.sar.palsar.product FILE``.
+    """Print what a file holds: ``python -m navfilters.sar.palsar FILE``.
 
     Parameters
     ----------

@@ -80,12 +80,20 @@ class Field:
         As in the module's docstring.
     low, high : float
         Smallest and largest number that is possible.
+    seen : {"A", "B", "C", ""}
+        Who vouches for place and meaning: several public readers of real files, or a check on one
+        (A); two descriptions, or one with the agency's own numbers of fields (B); a single one, or
+        a conclusion (C). Empty for what is shown and never used.
+    why : str
+        Why other numbers are refused, where the field's name does not tell.
     """
 
     offset: int
     kind: str
     low: float = -math.inf
     high: float = math.inf
+    seen: str = ""
+    why: str = ""
 
     @property
     def size(self) -> int:

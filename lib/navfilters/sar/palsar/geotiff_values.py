@@ -114,7 +114,7 @@ def _check_datum(dataset: Any, path: str | Path, geoid: float) -> None:
     if on_ellipsoid and geoid != 0:
         raise ValueError(
             f"{path} must count heights from sea level for a geoid of {geoid} m; found heights "
-            "that count from the ellipsoid"
+            "that count from the ellipsoid: leave the geoid out"
         )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from navfilters.sar.palsar.ceos_fields import fault
 from navfilters.sar.palsar.image_headers import _CONSTANT, _TICK, Headers
+from navfilters.sar.palsar.leader_records import _DAY
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,20 +78,13 @@ def grid(headers: Headers, without_echo: np.ndarray) -> Grid:
         "line number", good, rows >= 2 * len(without_echo), "such that half of the lines are there"
     )
     for name in _CONSTANT:
-        value = headers.values[name][good]
-        changed = value != value[0]
-        split = headers.first + int(good[np.argmax(changed)])
-        ends = (headers.first, headers.first + len(without_echo))
-        needed = (
-            f"{value[0]} as in the lines before; records=({ends[0]}, {split}) or "
-            f"({split}, {ends[1]}) open one side"
-        )
-        headers.refuse(name, good, changed, needed)
+        _check_constant(headers, good, name)
     interval = line_interval(int(headers.within("PRF in mHz", good)[0]))
     years = np.array([date(year, 1, 1).toordinal() for year in range(2006, 2012)])
     days = years[headers.within("year", good) - 2006] + headers.within("day of year", good) - 1
-    clock = (days - days[0]) * 86400.0 + headers.within("millisecond of day", good) * _TICK
+    clock = (days - days[0]) * _DAY + headers.within("millisecond of day", good) * _TICK
     late = clock - rows * interval
+    _check_dates(headers, good, days, late)
     spread = np.maximum.accumulate(late) - np.minimum.accumulate(late)
     headers.refuse(
         "millisecond of day",
@@ -107,6 +101,37 @@ def grid(headers: Headers, without_echo: np.ndarray) -> Grid:
     start = (late.max() + late.min() + _TICK) / 2
     times = start + interval * np.arange(lines)
     return Grid(good, rows, lines, date.fromordinal(int(days[0])), times, interval)
+
+
+def _check_constant(headers: Headers, good: np.ndarray, name: str) -> None:
+    """Raise for the first line at which a field changes, with the parts that can be opened."""
+    value = headers.values[name][good]
+    changed = value != value[0]
+    k = int(np.argmax(changed))
+    split, end = headers.first + int(good[k]), headers.first + len(headers.values)
+    sides = [(headers.first, split)] if k > 1 else []
+    if len(value) > k + 1 and (value[k:] == value[k]).all():
+        sides.append((split, end))
+    parts = " or ".join(map(str, sides))
+    cure = f"; records={parts} open{'' if len(sides) > 1 else 's'} one side" if sides else ""
+    headers.refuse(name, good, changed, f"{value[0]} as in the lines before{cure}")
+
+
+def _check_dates(headers: Headers, good: np.ndarray, days: np.ndarray, late: np.ndarray) -> None:
+    """Raise for the first line whose date is not the one that the lines before lead to.
+
+    What each line's clock is ahead of even steps (n,) is in s.
+    """
+    step = np.r_[0.0, np.diff(late)]
+    off = np.rint(step / _DAY)
+    jumps = (off != 0) & (np.abs(step - off * _DAY) <= 2 * _TICK)
+    if jumps.any():
+        k = int(np.argmax(jumps))
+        due = date.fromordinal(int(days[k] - off[k]))
+        name, value = "day of year", due.timetuple().tm_yday
+        if headers.values["year"][good[k]] != due.year:
+            name, value = "year", due.year
+        headers.refuse(name, good, jumps, f"{value}: {due}, to which the lines before lead")
 
 
 def line_interval(prf: int) -> float:

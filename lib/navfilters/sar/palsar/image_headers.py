@@ -19,40 +19,44 @@ _HEADER = 128  # bytes of the prefix that are read; what follows has no agreed m
 _CODES = b"\x32\x0a\x12\x14"  # 50 10 18 20
 
 IMAGE = {
-    "file name": Field(48, "A16"),
-    "number of signal records": Field(180, "I6", 2, 999_999),
-    "signal record length": Field(186, "I6", PREFIX + 2, 999_999),
-    "bits a sample": Field(216, "I4"),
+    "file name": Field(48, "A16", seen="A"),
+    "number of signal records": Field(180, "I6", 2, 999_999, seen="A"),
+    "signal record length": Field(186, "I6", PREFIX + 2, 999_999, seen="A"),
+    "bits a sample": Field(216, "I4", seen="C"),
     "channels": Field(232, "I4"),
-    "number of lines": Field(236, "I8", 2, 999_999),
+    "number of lines": Field(236, "I8", 2, 999_999, seen="A"),
     "samples a line": Field(248, "I8"),
     "interleave": Field(268, "A4"),
-    "prefix bytes": Field(276, "I4", PREFIX, PREFIX),
+    "prefix bytes": Field(276, "I4", PREFIX, PREFIX, seen="A"),
     "format identifier": Field(400, "A28"),
 }
 
 LINE = {
-    "record codes": Field(4, "C4"),
-    "record length": Field(8, "B4"),
-    "line number": Field(12, "B4", 1, 9_999_999),
-    "left fill samples": Field(20, "B4", 0, 499_999),
-    "data samples": Field(24, "B4", 1, 499_999),
-    "right fill samples": Field(28, "B4", 0, 499_999),
-    "year": Field(36, "B4", 2006, 2011),  # from launch to the end of the mission
-    "day of year": Field(40, "B4", 1, 366),
-    "millisecond of day": Field(44, "B4", 0, 86_400_999),
+    "record codes": Field(4, "C4", seen="A"),
+    "record length": Field(8, "B4", seen="A"),
+    "line number": Field(12, "B4", 1, 9_999_999, seen="A"),
+    "left fill samples": Field(20, "B4", 0, 499_999, seen="A"),
+    "data samples": Field(24, "B4", 1, 499_999, seen="A"),
+    "right fill samples": Field(28, "B4", 0, 499_999, seen="A"),
+    "year": Field(36, "B4", 2006, 2011, seen="A", why="ALOS flew from 2006 to 2011"),
+    "day of year": Field(40, "B4", 1, 366, seen="A"),
+    "millisecond of day": Field(44, "B4", 0, 86_400_999, seen="A"),
     "channel indicator": Field(48, "B2"),
-    "transmit polarisation": Field(52, "B2", 0, 1),
-    "receive polarisation": Field(54, "B2", 0, 1),
-    "PRF in mHz": Field(56, "B4", 1_000_000, 5_000_000),
-    "ScanSAR scan number": Field(60, "B4", 0, 0),
-    "range compression": Field(64, "B2", 0, 0),
-    "chirp type": Field(66, "B2", 0, 0),
-    "chirp length in ns": Field(68, "B4", 0, 100_000),
+    "transmit polarisation": Field(52, "B2", 0, 1, seen="B"),
+    "receive polarisation": Field(54, "B2", 0, 1, seen="B"),
+    "PRF in mHz": Field(56, "B4", 1_000_000, 5_000_000, seen="A"),
+    "ScanSAR scan number": Field(
+        60, "B4", 0, 0, seen="A", why="the bursts of ScanSAR are not read"
+    ),
+    "range compression": Field(
+        64, "B2", 0, 0, seen="A", why="pulses that are compressed on board are not read"
+    ),
+    "chirp type": Field(66, "B2", 0, 0, seen="B", why="only a linear chirp is read"),
+    "chirp length in ns": Field(68, "B4", 0, 100_000, seen="A"),
     "chirp constant term in Hz": Field(72, "S4"),
-    "chirp linear term in Hz/us": Field(76, "S4"),
-    "missing-line flag": Field(96, "B4", 0, 1),
-    "slant range in m": Field(116, "B4", 600_000, 1_300_000),
+    "chirp linear term in Hz/us": Field(76, "S4", seen="B"),
+    "missing-line flag": Field(96, "B4", 0, 1, seen="B"),
+    "slant range in m": Field(116, "B4", 600_000, 1_300_000, seen="A"),
     "window position": Field(120, "B4"),  # its unit and zero are unknown: shown, never used
 }
 
@@ -116,7 +120,8 @@ class Headers:
         if bad.any():
             record = self.record(int(index[np.argmax(bad)]))
             where = f" in line {record.text('line number')}"
-            raise record.error(name, record.text(name), needed, where)
+            why = f": {LINE[name].why}" if LINE[name].why else ""
+            raise record.error(name, f"{record.text(name)}{why}", needed, where)
 
 
 def read_headers(path: Path, records: tuple[int, int] | None = None) -> Headers:

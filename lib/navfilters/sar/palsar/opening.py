@@ -59,21 +59,48 @@ def open_product(
         Windows that move by parts of a sample, line times that scatter by more than their
         resolution, a flagged leap second.
     """
+    return opened(*_files(Path(folder), polarisation), records, clock_offset)
+
+
+def opened(
+    image: Path,
+    leader: Path,
+    records: tuple[int, int] | None,
+    clock_offset: float,
+    first: Product | None = None,
+) -> Product:
+    """As ``open_product``, for known files.
+
+    Parameters
+    ----------
+    image, leader : Path
+    records, clock_offset
+        See ``open_product``.
+    first : Product, optional
+        Of which the columns are taken instead of those of the first line.
+
+    Returns
+    -------
+    Product
+
+    Raises
+    ------
+    ValueError, OSError
+    """
     offset = float(real_array("clock_offset", clock_offset, ""))
-    image, leader = _files(Path(folder), polarisation)
     said, headers = read_leader(leader), read_headers(image, records)
     lines = grid(headers, _without_echo(headers, said.summary))
     good, summary = lines.good, said.summary
     letters = _polarisation(headers, good)
     sampling_rate = 1e6 * summary.number("sampling rate in MHz")
-    near_range, shift, left, data = _windows(headers, good, sampling_rate)
-    samples = int(data[0])
+    near_range, samples, shift, left, data = _windows(headers, good, sampling_rate, first)
     valid = np.zeros((lines.lines, 2), np.int64)
     valid[lines.rows] = np.clip(np.stack([shift, shift + data], axis=-1), 0, samples)
     origin = np.zeros(lines.lines, np.int64)
     origin[lines.rows] = headers.start(good) + PREFIX + 2 * (left - shift)
     missing = np.ones(lines.lines, bool)
     missing[lines.rows] = False
+    dc = complex(*(summary.number(f"DC bias of {part}", blank=MIDDLE) for part in "IQ"))
     chirp_rate, pulse_length = pulse(summary, headers.record(int(good[0])), sampling_rate)
     times, vectors = lines.times + offset, state_vectors(said.position, lines.day)
     if not vectors.times[0] <= times[0] <= times[-1] <= vectors.times[-1]:
@@ -95,23 +122,62 @@ def open_product(
         chirp_rate=chirp_rate,
         pulse_length=pulse_length,
         wavelength=wavelength(summary),
-        dc=complex(*(summary.number(f"DC bias of {part}", blank=MIDDLE) for part in "IQ")),
+        dc=dc,
         polarisation=letters,
         state_vectors=vectors,
         _origin=origin,
+        _frame=np.zeros(lines.lines, np.int64),
+        _images=((image, dc),),
     )
 
 
-def _files(folder: Path, polarisation: str | None) -> tuple[Path, Path]:
-    """The image and the leader file of a folder."""
-    wanted = "IMG-" if polarisation is None else f"IMG-{polarisation.upper()}-"
+def scenes(folder: Path, polarisation: str | None) -> list[tuple[Path, Path]]:
+    """The image and the leader file of every scene of a folder.
+
+    Parameters
+    ----------
+    folder : Path
+    polarisation : str or None
+
+    Returns
+    -------
+    list of (Path, Path)
+
+    Raises
+    ------
+    ValueError, OSError
+    """
+    files = _listed(folder)
+    leaders = _of_product(files, "LED-")
+    ends = tuple(path.name.upper()[3:] for path in leaders)
+    for image in _of_product(files, "IMG-"):
+        if leaders and not image.name.upper().endswith(ends):
+            needed = f"{folder} must hold a leader file LED-... of each scene"
+            raise ValueError(f"{needed}; found none of {image.name}")
+    names = [path.name[4:] for path in leaders] if len(leaders) > 1 else [""]
+    return [_files(folder, polarisation, name) for name in names]
+
+
+def _listed(folder: Path, scene: str = "") -> list[Path]:
+    """The files of a folder, or those of one scene by the end of their names."""
     files = sorted(path for path in folder.iterdir() if path.is_file())
+    end = f"-{scene.upper()}" if scene else ""
+    return [path for path in files if path.name.upper().endswith(end)]
+
+
+def _files(folder: Path, polarisation: str | None, scene: str = "") -> tuple[Path, Path]:
+    """The image and the leader file of a folder, or of one of the scenes in it."""
+    wanted = "IMG-" if polarisation is None else f"IMG-{polarisation.upper()}-"
+    files = _listed(folder, scene)
     images, leaders = (_of_product(files, start) for start in (wanted, "LED-"))
-    for found, name, hint in ((images, wanted, ": choose a polarisation"), (leaders, "LED-", "")):
+    for found, name in ((images, wanted), (leaders, "LED-")):
         if len(found) != 1:
             names = ", ".join(path.name for path in found) or _instead(files)
-            hint = hint if len(found) > 1 and polarisation is None else ""
-            raise ValueError(f"{folder} must hold one file {name}...; found {names}{hint}")
+            hint = ": open_frames joins frames of one pass" if len(leaders) > 1 else ""
+            if len({path.name.upper()[4:6] for path in images}) > 1 and polarisation is None:
+                hint = ": choose a polarisation"
+            needed = f"{folder} must hold one file {name}...{scene}"
+            raise ValueError(f"{needed}; found {names}{hint}")
     image, leader = images[0], leaders[0]
     if not image.name.upper().endswith(leader.name.upper()[4:]):
         raise ValueError(
@@ -186,9 +252,9 @@ def _polarisation(headers: Headers, good: np.ndarray) -> str:
 
 
 def _windows(
-    headers: Headers, good: np.ndarray, sampling_rate: float
-) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-    """Near range of the first line, m; shift, left fill and data of every line (n,), samples."""
+    headers: Headers, good: np.ndarray, sampling_rate: float, first: Product | None
+) -> tuple[float, int, np.ndarray, np.ndarray, np.ndarray]:
+    """Near range, m, and samples of the first line; shift, left fill and data of each, samples."""
     slant = headers.within("slant range in m", good)
     left, data, right = (
         headers.within(f"{name} samples", good) for name in ("left fill", "data", "right fill")
@@ -196,14 +262,17 @@ def _windows(
     room = (headers.length - PREFIX) // 2
     needed = f"at most {room} with the fill samples"
     headers.refuse("data samples", good, left + data + right > room, needed)
-    exact = 2 * sampling_rate / SPEED_OF_LIGHT * (slant - slant[0])
+    near, samples, of = float(slant[0]), int(data[0]), ""
+    if first is not None:
+        near, samples, of = first.near_range, first.samples, f" of {first.image}"
+    exact = 2 * sampling_rate / SPEED_OF_LIGHT * (slant - near)
     shift = np.rint(exact).astype(np.int64)
-    apart = (shift >= data[0]) | (shift + data <= 0)
-    needed = f"such that the window meets that of the first line, at {slant[0]} m"
+    apart = (shift >= samples) | (shift + data <= 0)
+    needed = f"such that the window meets that of the first line{of}, at {near:.0f} m"
     headers.refuse("slant range in m", good, apart, needed)
     if (off := np.abs(exact - shift).max()) > 0.25:  # whole metres explain 0.21 at 32 MHz
         warnings.warn(
             f"{headers.descriptor.path}: the window moves by parts of a sample, up to {off:.2f}",
             stacklevel=3,
         )
-    return float(slant[0]), shift, left, data
+    return near, samples, shift, left, data

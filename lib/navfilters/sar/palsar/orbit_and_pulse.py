@@ -131,7 +131,9 @@ def pulse(summary: Record, line: Record, sampling_rate: float) -> tuple[float, f
     )
     if rate * length > sampling_rate:
         needed = f"one whose band over {length:.6g} s fits {sampling_rate:.6g} Hz"
-        raise summary.error("chirp rate in Hz/s", f"{rate:.6g}", needed)
+        if summary.number("chirp rate in Hz/s", blank=0):
+            raise summary.error("chirp rate in Hz/s", f"{rate:.6g}", needed)
+        raise line.error("chirp linear term in Hz/us", f"{1e-6 * rate:.6g}", needed)
     return -rate, length
 
 

@@ -2,6 +2,7 @@
 
 import datetime
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,7 +21,7 @@ _BLOCK = 256  # lines that the Doppler estimate holds at once
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """A product that ``open_product`` has checked; samples stay in the file until read.
+    """What ``open_product`` or ``open_frames`` has checked; samples stay in the files until read.
 
     Column k of every line is the echo at range near_range + k c / (2 sampling_rate), whatever the
     line's own window was: that of the first line that is not missing counts for all.
@@ -28,6 +29,7 @@ class Product:
     Parameters
     ----------
     image, leader : Path
+        Of the first frame, where several are joined.
     lines, samples : int
         Shape of the whole image; lines that are missing count.
     day : datetime.date
@@ -52,7 +54,7 @@ class Product:
     wavelength : float
         m.
     dc : complex
-        Code of zero signal, I + iQ.
+        Code of zero signal, I + iQ; each frame's own is used to read it.
     polarisation : str
         Transmitted, received: "HH", "HV", "VH" or "VV".
     state_vectors : StateVectors
@@ -78,6 +80,13 @@ class Product:
     polarisation: str
     state_vectors: StateVectors
     _origin: np.ndarray = field(repr=False)  # (lines,) bytes at which column 0 stands, or would
+    _frame: np.ndarray = field(repr=False)  # (lines,) of the images, which one holds a line
+    _images: tuple[tuple[Path, complex], ...] = field(repr=False)  # with their codes of zero signal
+
+    @property
+    def name(self) -> str:
+        """Of the image file; of all of them, where frames are joined."""
+        return " + ".join(path.name for path, _ in self._images)
 
     def read(self, first: int, last: int) -> np.ndarray:
         """Echoes of some lines, without the code of zero signal.
@@ -105,22 +114,20 @@ class Product:
         """
         first, last = self._range(first, last)
         echoes = np.zeros((last - first, self.samples), np.complex64)
-        zero = np.array([self.dc.real, self.dc.imag], np.float32)
-        over = 0
-        with open(self.image, "rb", buffering=0) as file:
-            for row, line in zip(echoes, range(first, last), strict=True):
-                start, stop = (int(column) for column in self.valid[line])
-                at, name = int(self._origin[line]) + 2 * start, f"line {line}"
-                raw = take(file, self.image, at, 2 * (stop - start), name)
-                codes = np.frombuffer(raw, np.uint8).reshape(-1, 2)
-                over += int(np.count_nonzero(codes > _TOP))
-                np.subtract(codes, zero, out=row[start:stop].view(np.float32).reshape(-1, 2))
-        if over:
-            warnings.warn(
-                f"{self.image}: {over} values of lines {first} to {last - 1} are above {_TOP}, "
-                "more than 5 bits hold",
-                stacklevel=2,
-            )
+        over = dict.fromkeys((path for path, _ in self._images), 0)
+        for line, codes in self._codes(first, last):
+            path, dc = self._images[self._frame[line]]
+            over[path] += int(np.count_nonzero(codes > _TOP))
+            start, stop = self.valid[line]
+            out = echoes[line - first, start:stop].view(np.float32).reshape(-1, 2)
+            np.subtract(codes, np.array([dc.real, dc.imag], np.float32), out=out)
+        for path, many in over.items():
+            if many:
+                warnings.warn(
+                    f"{path}: {many} values of lines {first} to {last - 1} are above {_TOP}, "
+                    "more than 5 bits hold",
+                    stacklevel=2,
+                )
         return echoes
 
     def doppler_centroid(self, first: int, last: int) -> float:
@@ -153,6 +160,19 @@ class Product:
                 f"first, last must hold two neighbours with echoes; found {first}, {last}"
             )
         return float(self.prf * np.angle(together) / (2 * np.pi))
+
+    def _codes(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray]]:
+        """Lines, image by image, and the codes (n, 2) of their valid columns as they stand."""
+        for k, (path, _) in enumerate(self._images):
+            lines = first + np.flatnonzero(self._frame[first:last] == k)
+            if not len(lines):
+                continue
+            with open(path, "rb", buffering=0) as file:
+                for line in lines:
+                    start, stop = (int(column) for column in self.valid[line])
+                    at = int(self._origin[line]) + 2 * start
+                    raw = take(file, path, at, 2 * (stop - start), f"line {line}")
+                    yield int(line), np.frombuffer(raw, np.uint8).reshape(-1, 2)
 
     def _range(self, first: int, last: int) -> tuple[int, int]:
         first = whole_number("first", first, 0)
