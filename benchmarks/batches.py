@@ -4,14 +4,17 @@ Both do the same runs with the same random numbers, on one core, in turns. The l
 of the runs, since each costs the same. Results are medians over the turns.
 
 The second part makes linear updates of two measurements for states of several sizes. The third
-splits the cost of a compiled series of one member into that of the call and that of an update, and
-the fourth times the arctangent that an update cannot do without.
+splits the cost of a compiled series of one member into that of the call and that of an update, the
+fourth times the arctangent that an update cannot do without, and the fifth takes one filter alone
+under NumPy apart.
 """
 
 import json
 import os
 import sys
 import time
+from collections.abc import Callable
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from statistics import median
@@ -21,12 +24,15 @@ if hasattr(os, "sched_setaffinity"):
 
 import jax
 import numpy as np
+import peers
 import peers_moving
 import problems
+from filterpy.kalman import ExtendedKalmanFilter
 
-from navfilters import FILTERS, Gaussian, sweep
+from navfilters import FILTERS, Gaussian, run, sweep
 from navfilters.models import Linear
-from navfilters.papers import pogorelsky2020, xiong2009
+from navfilters.numerics.small_matrices import matmul
+from navfilters.papers import perea2007, pogorelsky2020, xiong2009
 
 REPEATS = 5
 RESULTS = Path(__file__).with_name("batches.json")
@@ -129,14 +135,60 @@ def arctangent() -> dict[str, float]:
         "navfilters, NumPy": lambda: [np.arctan2(y, x) for _ in range(TIMES)],
     }
     found = {}
-    for who, run in contenders.items():
+    for who, compute in contenders.items():
         spent = []
         for _ in range(REPEATS + 1):  # the first compiles
             start = time.process_time()
-            run()
+            compute()
             spent.append((time.process_time() - start) / (TIMES * len(x)) * 1e9)
         found[who] = round(median(spent[1:]), 1)
     return found
+
+
+ALONE = 2000
+
+
+def alone() -> dict[str, float]:
+    """Microseconds under NumPy of an update of one EKF, range and bearing, and of parts of it."""
+    setup = perea2007.Setup()
+    prior, z, model = setup.prior, setup.z, setup.model
+    H, R = model.jacobian(prior.mean), model.R
+
+    def ours(form: str) -> Callable[[int], object]:
+        ekf = replace(FILTERS["EKF"], form=form)
+        return lambda times: run(ekf, prior, z, model, times)
+
+    def theirs(h: Callable, jacobian: Callable) -> Callable[[int], object]:
+        ekf = ExtendedKalmanFilter(2, 2)
+        ekf.R = R
+
+        def updates(times: int) -> None:
+            ekf.x, ekf.P = prior.mean.copy(), prior.cov.copy()
+            for _ in range(times):
+                ekf.update(z, jacobian, h)
+
+        return updates
+
+    def repeated(part: Callable[[], object]) -> Callable[[int], object]:
+        return lambda times: [part() for _ in range(times)]
+
+    parts = {
+        "an update": ours("joseph"),
+        "an update in the short form": ours("short"),
+        "filterpy with the same model": theirs(model.h, model.jacobian),
+        "filterpy with a bare model": theirs(peers.h, peers.jacobian),
+        "h and its Jacobian": repeated(lambda: (model.h(prior.mean), model.jacobian(prior.mean))),
+        "the same, bare": repeated(lambda: (peers.h(prior.mean), peers.jacobian(prior.mean))),
+        "a product of 2 by 2": repeated(lambda: matmul(H, R)),
+        "the same by BLAS": repeated(lambda: H @ R),
+    }
+    spent: dict[str, list[float]] = {what: [] for what in parts}
+    for _ in range(REPEATS + 1):  # the first fills caches
+        for what, part in parts.items():
+            start = time.process_time()
+            part(ALONE)
+            spent[what].append((time.process_time() - start) / ALONE * 1e6)
+    return {what: float(f"{median(each[1:]):.2g}") for what, each in spent.items()}
 
 
 def main() -> None:
@@ -150,6 +202,8 @@ def main() -> None:
     sys.stdout.write(f"one member, compiled: {result['calls']}\n")
     result["arctangent"] = arctangent()
     sys.stdout.write(f"ns of an arctangent: {result['arctangent']}\n")
+    result["alone"] = alone()
+    sys.stdout.write(f"us of one EKF: {result['alone']}\n")
     for name, contest in CONTESTS.items():
         found = result["results"][name] = compare(*contest)
         sys.stdout.write(

@@ -44,15 +44,18 @@ def ours(name: str, engine: str) -> Callable[..., Prepared]:
     return prepare
 
 
+def h(x):
+    """Range and bearing from the origin, as one writes it without a library."""
+    return np.array([np.hypot(x[0], x[1]), np.arctan2(x[1], x[0])])
+
+
+def jacobian(x):
+    r = np.hypot(x[0], x[1])
+    return np.array([[x[0] / r, x[1] / r], [-x[1] / r**2, x[0] / r**2]])
+
+
 def filterpy(name: str) -> Callable[..., Prepared]:
     """One object per member; for the UKF, prediction makes it draw its sigma points anew."""
-
-    def h(x):
-        return np.array([np.hypot(x[0], x[1]), np.arctan2(x[1], x[0])])
-
-    def jacobian(x):
-        r = np.hypot(x[0], x[1])
-        return np.array([[x[0] / r, x[1] / r], [-x[1] / r**2, x[0] / r**2]])
 
     def make(mean, cov, R):
         if name == "EKF":
