@@ -91,7 +91,7 @@ def test_the_range_has_the_runs_own_noise(product, patches):
 
 def test_a_report_is_the_table_of_the_runs_on_the_files(monkeypatch):
     """Each part is made of those before it."""
-    monkeypatch.setattr(real_loop, "open_product", lambda folder: f"product of {folder}")
+    monkeypatch.setattr(real_loop, "open_frames", lambda folder: f"product of {folder}")
     monkeypatch.setattr(real_loop, "cut_patches", lambda product, *files, **_: [product, *files])
     monkeypatch.setattr(real_loop, "run_filter", lambda *given, **_: given[:2])
     monkeypatch.setattr(real_loop, "real_table", lambda *given: given)

@@ -121,11 +121,13 @@ def test_bad_input():
         fly_with_offsets(SETUP, [Trial()], {"height": 1.0})
 
 
-def test_a_trial_of_the_table_is_flown_alone():
-    found = fly("TC-2", [Trial(late=1e-3)], 2, [3, 5], 1)
-    errors, covariances = antenna_tables._flown("TC-2", Trial(late=1e-3), 2, [3, 5], 1)
-    assert_array_equal(errors, found.errors[2, 0])
-    assert_array_equal(covariances, found.covariances[2, 0])
+def test_rows_of_the_table_are_flown_together():
+    trials = [Trial(late=1e-3), Trial("plane")]
+    found = fly("TC-2", trials, 2, [3, 5], 1)
+    rows = [antenna_tables.Row("a row", trial, 2) for trial in trials]
+    errors, covariances = antenna_tables._flown("TC-2", rows, [3, 5], 1)
+    assert_array_equal(errors, found.errors[2])
+    assert_array_equal(covariances, found.covariances[2])
 
 
 @pytest.mark.slow

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from navfilters.models import Linear, RangeBearing
 from navfilters.papers.perea2007.experiment import FILTERS as PAPER
 from navfilters.papers.perea2007.experiment import position_error
 from navfilters.runs import records
-from navfilters.runs.workers import on_cluster
 
 
 def everything(state):
@@ -235,35 +233,3 @@ def test_a_model_is_looked_at_once_for_problems_that_differ_in_numbers_alone():
         assert (min(LOOKED_AT) < 11) == looks
         wanted = run(EKF, priors(), z, Counted(np.eye(2)), 2)
         assert_same(got.final, (wanted.mean[-1], wanted.cov[-1]))
-
-
-class InOrder:
-    """A cluster of one core without a network: futures are done as they were submitted."""
-
-    def __init__(self, futures):
-        self.waiting = list(futures)
-
-    def add(self, future):
-        self.waiting.append(future)
-
-    def __next__(self):
-        return self.waiting.pop(0)
-
-    @staticmethod
-    def ncores():
-        return {"here": 1}
-
-    @staticmethod
-    def submit(call, task, pure):
-        return SimpleNamespace(result=lambda: call(task))
-
-    @staticmethod
-    def cancel(futures):
-        assert futures == []
-
-
-def test_each_task_of_a_cluster_is_waited_for_once(monkeypatch):
-    distributed = pytest.importorskip("distributed")
-    monkeypatch.setattr(distributed, "as_completed", InOrder)
-    squares = on_cluster(lambda task: task**2, iter(range(5)), InOrder)
-    assert list(squares) == [0, 1, 4, 9, 16]
