@@ -27,7 +27,8 @@ CONTROLS = """() => {
         }
     })
     document.addEventListener('focusout', event => {
-        if (!event.relatedTarget) window.over = true
+        // Not of an entry of the contents that folds while it has the focus: the next Tab goes on.
+        if (!event.relatedTarget && event.target.checkVisibility()) window.over = true
     })
     window.wanted = used
     return used.length

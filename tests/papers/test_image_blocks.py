@@ -255,6 +255,10 @@ def test_a_campaign_stores_each_image_of_a_direct_run_and_its_report(tmp_path, m
     assert campaign_report(again) == campaign_report(found)
 
 
+def test_an_image_is_looked_at_alike_on_both_sides_of_its_velocity():
+    assert_array_equal(own_images.OFFSETS, -own_images.OFFSETS[::-1])
+
+
 @pytest.mark.slow
 def test_the_stored_sets_are_what_the_library_computes(monkeypatch):
     """The first image of the first run, without the other two."""
