@@ -82,7 +82,7 @@ lint: $(VENV)/.test  ## ruff over code and notebooks, mypy and the layers of imp
 $(BUILT) elsewhere: export OPENBLAS_THREAD_TIMEOUT := 4
 nbval: $(VENV)/.test  ## run every notebook and compare with its stored outputs
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH="$(CURDIR)/tools" $(BIN)/pytest book --nbval --nbval-current-env -n 2 --dist loadscope \
-		--no-loadscope-reorder -p no:cacheprovider -p longest_first -p keep_executed
+		--no-loadscope-reorder --nbval-kernel-startup-timeout 20 -p no:cacheprovider -p kernels -p longest_first -p keep_executed
 
 elsewhere: $(VENV)/.test  ## the same without AVX-512, and with another BLAS kernel on one thread
 	$(BIN)/python tools/nbval_elsewhere.py

@@ -32,9 +32,13 @@ def main() -> None:
     sys.stdout.write(f"{len(paths) - len(waiting)} notebooks were executed by nbval\n")
     for path in waiting:
         cache.add_nb_to_project(str(path))
-    done = load_executor("local-parallel", cache).run_and_cache(timeout=300)
-    failed = done.excepted + done.errored
-    sys.stdout.write(f"{len(done.succeeded)} notebooks executed, {len(failed)} failed\n")
+    executor = load_executor("local-parallel", cache)
+    done = executor.run_and_cache(timeout=300)
+    ran, failed = done.succeeded, done.excepted
+    if done.errored:  # before the first cell: the kernel did not start (see ``kernels``)
+        done = executor.run_and_cache(filter_uris=done.errored, timeout=300)
+        ran, failed = ran + done.succeeded, failed + done.excepted + done.errored
+    sys.stdout.write(f"{len(ran)} notebooks executed, {len(failed)} failed\n")
     for record in cache.list_project_records():
         if record.uri in failed:
             sys.stderr.write(f"{record.uri}\n{record.traceback}\n")

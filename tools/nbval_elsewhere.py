@@ -18,6 +18,10 @@ PYTEST = [
     "--dist",
     "loadscope",
     "--no-loadscope-reorder",
+    "--nbval-kernel-startup-timeout",
+    "20",
+    "-p",
+    "kernels",
     "-p",
     "longest_first",
 ]
