@@ -40,8 +40,8 @@ test -z "$(2)" && $(1)/bin/python -c '$(WHOLE)' >/dev/null 2>&1 || $(PYTHON) -m 
 endef
 
 # Installs into an environment by uv where there is one, else by the environment's pip.
-UV := $(shell command -v uv >/dev/null && echo uv)
-install = $(if $(UV),uv pip install --python $(1)/bin/python --compile-bytecode,$(1)/bin/python -m pip install \
+UV := $(shell command -v uv)
+install = $(if $(UV),$(UV) pip install --python $(1)/bin/python --compile-bytecode,$(1)/bin/python -m pip install \
 	--disable-pip-version-check) --quiet
 locked = $(call install,$(1)) --require-hashes -r $(2)
 ours = $(call install,$(1)) --no-deps --no-build-isolation -e .
