@@ -114,6 +114,7 @@ def apart() -> Iterator[Client]:
     finally:
         for process in (workers, scheduler):
             process.terminate()
+            process.send_signal(signal.SIGCONT)  # one that was stopped
             process.wait()
 
 
@@ -123,9 +124,9 @@ def lose_workers(client: Client, count: int, kind: signal.Signals) -> None:
         os.kill(process, kind)
 
 
-def lose_scheduler(client: Client) -> None:
-    """Its process is gone."""
-    os.kill(client.run_on_scheduler(os.getpid), signal.SIGKILL)
+def lose_scheduler(client: Client, kind: signal.Signals) -> None:
+    """Its process is gone, or stops."""
+    os.kill(client.run_on_scheduler(os.getpid), kind)
 
 
 class Fault(NamedTuple):
@@ -150,7 +151,8 @@ FAULTS = {
     "one worker killed": Fault(partial(lose_workers, count=1, kind=signal.SIGKILL)),
     "both workers killed at once": Fault(partial(lose_workers, count=2, kind=signal.SIGKILL)),
     "one worker told to end": Fault(partial(lose_workers, count=1, kind=signal.SIGTERM)),
-    "scheduler killed": Fault(lose_scheduler, apart),
+    "scheduler killed": Fault(partial(lose_scheduler, kind=signal.SIGKILL), apart),
+    "scheduler silent": Fault(partial(lose_scheduler, kind=signal.SIGSTOP), apart),
     "client closed": Fault(Client.close),
     "every result spilled to disk": Fault(None, partial(local, LIMIT, target=1e-9)),
     "memory nearly full": Fault(None, partial(local, LIMIT), MUCH),

@@ -1,6 +1,8 @@
 """A cluster that loses its workers, its memory or its scheduler: all is computed once, or told."""
 
+import asyncio
 import os
+import re
 from types import SimpleNamespace
 
 import dask
@@ -54,6 +56,19 @@ def test_a_scheduler_that_is_lost_is_told_and_another_goes_on(tmp_path):
         got = swept(client=client, checkpoint=tmp_path, progress=again.append)
     assert sum(again) == 60
     assert_same(got.final, swept().final)
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_is_silent_is_not_waited_for_for_ever(threads, monkeypatch):
+    async def silent():
+        await asyncio.sleep(60)
+
+    def fall_silent(_):
+        monkeypatch.setattr(threads.scheduler, "identity", silent)
+
+    where = re.escape(f"the cluster at {threads.cluster.scheduler_address} has lost this work")
+    with pytest.raises(ConnectionError, match=rf"{where} \(TimeoutError: timed out after 0.5 s"):
+        swept(400, client=threads, progress=fall_silent)
 
 
 @pytest.mark.slow
@@ -118,7 +133,7 @@ class Seen:
     def __init__(self, *looks):
         self.looks = iter(looks)
 
-    def sync(self, _):
+    def sync(self, _, callback_timeout):
         return {"workers": next(self.looks)}
 
 

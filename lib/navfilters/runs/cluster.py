@@ -15,7 +15,7 @@ from navfilters.runs.chunks import SweepError
 from navfilters.runs.march import Chunk
 
 PATIENCE = 30.0
-"""Seconds for which a sweep waits while no worker of a cluster can work."""
+"""Seconds for which a sweep waits while no worker can work, or the scheduler is silent."""
 
 PULSE = 1.0
 """Seconds after which a cluster is looked at again."""
@@ -38,7 +38,7 @@ def on_cluster(call: Callable[[Chunk], Any], tasks: Iterator[Chunk], client: Any
     TimeoutError
         For a while no worker was there, or all were paused.
     ConnectionError
-        The scheduler is gone, or the client.
+        The scheduler is gone or does not answer, or the client is gone.
     SweepError
         The workers of a chunk died one after the other.
     """
@@ -138,7 +138,8 @@ class _Watch:
         if now - self.looked < PULSE:
             return
         with _loss_is_told(self.client, self.address):
-            found = self.client.sync(self.client.scheduler.identity)["workers"]
+            ask = self.client.scheduler.identity
+            found = self.client.sync(ask, callback_timeout=PATIENCE)["workers"]
         # A worker that is started again may have the address of the one before, but not its folder.
         workers = {(where, worker["local_directory"]): worker for where, worker in found.items()}
         if any(map(_can_work, (workers[name] for name in workers.keys() & self.workers.keys()))):
