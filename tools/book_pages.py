@@ -8,6 +8,8 @@ import io
 import json
 import re
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -49,6 +51,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("autodoc-skip-member", without_description)
     app.connect("missing-reference", where_it_is_public)
     app.connect("html-page-context", mathjax_where_needed, priority=900)
+    app.connect("html-page-context", partial(contents_once, {}), priority=400)  # before the theme
     app.connect("build-finished", lighter)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -113,6 +116,21 @@ def mathjax_where_needed(app, pagename, templatename, context, doctree) -> None:
         files[:] = [file for file in files if "mathjax" not in str(file.filename or "")]
 
 
+def contents_once(made, app, pagename, templatename, context, doctree) -> None:
+    """The book's contents beside a page of code, made once for all such pages that lie as deep."""
+    if pagename in app.env.found_docs:
+        return
+    make, depth = context["toctree"], pagename.count("/")
+
+    def contents(**options) -> str:
+        key = (depth, *sorted(options.items()))
+        if key not in made:
+            made[key] = make(**options)
+        return made[key]
+
+    context["toctree"] = contents
+
+
 def lighter(app, exception) -> None:
     """Reduce what the built pages load."""
     if exception or app.builder.format != "html":
@@ -123,8 +141,8 @@ def lighter(app, exception) -> None:
     few_icons(out)
     few_characters(out / "_static")
     licences(out / "_static" / "licences")
-    for picture in sorted((out / "_images").glob("*.png")):
-        with_palette(picture)
+    with ThreadPoolExecutor() as pool:
+        list(pool.map(with_palette, sorted((out / "_images").glob("*.png"))))
 
 
 def mend(page: Path) -> None:

@@ -1,5 +1,6 @@
 """What the book's pages get beyond the theme's."""
 
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import book_pages
@@ -86,3 +87,19 @@ def test_a_picture_of_many_colours_or_a_clear_one_stays(tmp_path):
         before = path.read_bytes()
         book_pages.with_palette(path)
         assert path.read_bytes() == before
+
+
+def test_pages_of_code_that_lie_as_deep_share_their_contents():
+    app, made = SimpleNamespace(env=SimpleNamespace(found_docs={"book/a"})), {}
+
+    def shown(page, **options):
+        context = {"toctree": lambda **options: (page, options)}
+        book_pages.contents_once(made, app, page, "page.html", context, None)
+        return context["toctree"](**options)
+
+    assert shown("_modules/a/b", depth=1) == ("_modules/a/b", {"depth": 1})
+    assert shown("_modules/a/c", depth=1) == ("_modules/a/b", {"depth": 1})
+    assert shown("_modules/a/c", depth=2) == ("_modules/a/c", {"depth": 2})
+    assert shown("_modules/a", depth=1) == ("_modules/a", {"depth": 1})
+    assert shown("book/a", depth=1) == ("book/a", {"depth": 1})  # marks itself in them
+    assert shown("search", depth=1) == ("search", {"depth": 1})
