@@ -248,7 +248,8 @@ def recalibrated(seen: Observation, prior: Gaussian, moments: Moments, y: Array)
     jiang2024, with the gain that it keeps and the trace as the judge.
     """
     after = seen.corrected(prior, moments, y)
-    K = gain(seen.whole(moments, y)[0])
+    _, P_zz, P_xz, *_ = seen.whole(moments, y)[0]
+    K = gain(P_zz, P_xz)
     changed, again, _ = seen.again(Gaussian(after.mean, seen.prior.cov))
     cov = covariance_after(changed.cov, K, again, seen.form)
     if again.exact is not None:

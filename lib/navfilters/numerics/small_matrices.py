@@ -1,12 +1,14 @@
 """Products, factors and solutions of small matrices, batched: written out where that is faster."""
 
 import math
+from functools import partial
 
 import numpy as np
 
+from navfilters.numerics.in_floats import POINTS, SMALL, in_floats
 from navfilters.types import Array
 
-WRITTEN_OUT = 2
+WRITTEN_OUT = SMALL
 """Largest size of the matrices whose products are written out; above, BLAS is as fast."""
 
 
@@ -29,17 +31,10 @@ def matmul(A: Array, B: Array) -> Array:
     """
     if max(A.shape[-2], A.shape[-1], B.shape[-1]) > WRITTEN_OUT:
         return A @ B
-    if A.shape[-1] == 2 and _alone(A) and _alone(B):
-        columns = B.T.tolist()
-        return np.array([[a * c + b * d for c, d in columns] for a, b in A.tolist()])
     return written_out(A, B)
 
 
-def _alone(A: Array) -> bool:
-    """One matrix of doubles under NumPy: the same bits by Python's floats, in less time."""
-    return type(A) is np.ndarray and A.ndim == 2 and A.dtype.char == "d" and A.size > 0
-
-
+@partial(in_floats, longest=POINTS)
 def written_out(A: Array, B: Array) -> Array:
     """A B as a sum of products of A's columns and B's rows, whatever their size.
 
@@ -133,7 +128,7 @@ def cholesky(A: Array) -> Array:
     array (..., n, n)
         NaN from the first pivot that is not positive, in the members that have none.
     """
-    n, alone = A.shape[-1], _alone(A)
+    n, alone = A.shape[-1], type(A) is np.ndarray and A.ndim == 2 and A.dtype.char == "d"
     a = A.tolist() if alone else [[A[..., i, j] for j in range(i + 1)] for i in range(n)]
     root = _root if alone else _roots
     zero = 0.0 if alone else a[0][0].__array_namespace__().zeros_like(a[0][0])
@@ -174,8 +169,11 @@ def whitened_square(L: Array, y: Array) -> Array:
     return sum(x * x for x in w)
 
 
+EPS = float(np.finfo(float).eps)
+
+
 def _rounding(n: int) -> float:
-    return 8 * n * float(np.finfo(float).eps)
+    return 8 * n * EPS
 
 
 def _deferred_cholesky(A: Array) -> tuple[Array, Array, Array]:
@@ -241,13 +239,16 @@ def right_divide(B: Array, A: Array) -> Array:
     if m == 1:
         return B / A
     if m == 2:
-        if _alone(A):
-            (a, b), (c, d) = A.tolist()
-            return matmul(B, np.array([[d, -b], [-c, a]])) / np.float64(a * d - b * c)
-        a, b, c, d = A[..., 0, 0], A[..., 0, 1], A[..., 1, 0], A[..., 1, 1]
-        adjugate = matrix([[d, -b], [-c, a]])
-        return matmul(B, adjugate) / (a * d - b * c)[..., None, None]
+        adjugate, determinant = _adjugate(A)
+        return matmul(B, adjugate) / determinant
     return _solve(A.mT, B.mT).mT
+
+
+@in_floats
+def _adjugate(A: Array) -> tuple[Array, Array]:
+    """That of 2 x 2, and the determinant (..., 1, 1)."""
+    a, b, c, d = A[..., 0, 0], A[..., 0, 1], A[..., 1, 0], A[..., 1, 1]
+    return matrix([[d, -b], [-c, a]]), (a * d - b * c)[..., None, None]
 
 
 def _solve(A: Array, B: Array) -> Array:
