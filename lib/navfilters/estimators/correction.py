@@ -1,8 +1,7 @@
 """How a measurement corrects a prior: at once, or by looking at the model again."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from navfilters.estimators.model_parts import difference, retract
 from navfilters.estimators.update import (
@@ -22,8 +21,7 @@ from navfilters.numerics.small_matrices import matmul, right_divide
 from navfilters.types import Array, Gaussian, Moments
 
 
-@dataclass(frozen=True, eq=False)
-class Observation:
+class Observation(NamedTuple):
     """A measurement, the prior that it corrects, and how a filter looks at both.
 
     Parameters

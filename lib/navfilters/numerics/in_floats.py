@@ -48,11 +48,13 @@ def in_floats(formula: T, *, longest: int = SMALL) -> T:
     -----
     A quotient by zero, which floats refuse, is left to the formula itself.
     """
-    ndarray = np.ndarray
+    ndarray, most = np.ndarray, longest * SMALL * SMALL
     plans: dict[tuple[Shape, ...], Callable[..., Any]] = {}
 
     @wraps(formula)
     def chosen(*arrays: Array) -> Any:
+        if arrays[0].size > most:  # at once where it is not for floats
+            return formula(*arrays)
         for A in arrays:
             if type(A) is not ndarray or A.dtype is not DOUBLE:
                 return formula(*arrays)
@@ -71,7 +73,11 @@ def in_floats(formula: T, *, longest: int = SMALL) -> T:
 
 
 def _small(shape: Shape, longest: int) -> bool:
-    return len(shape) in (1, 2) and 0 < shape[-1] <= SMALL and 0 < shape[0] <= longest
+    """Of a vector, a matrix or a point's; also of a member or two with an axis for members."""
+    limits = (SMALL,) if len(shape) == 1 else (longest, SMALL, SMALL)
+    return 0 < len(shape) <= 3 and all(
+        0 < size <= limit for size, limit in zip(shape, limits, strict=False)
+    )
 
 
 def _plan(formula: Callable[..., Any], shapes: tuple[Shape, ...]) -> Callable[..., Any]:
@@ -84,7 +90,7 @@ def _plan(formula: Callable[..., Any], shapes: tuple[Shape, ...]) -> Callable[..
         lines.append(f"{_listed(symbols[-1])} = A{k}.tolist()")
     found = formula(*symbols)
     several = found if type(found) is tuple else (found,)
-    lines.append(f"return {', '.join(f'array({_listed(A)})' for A in several)}")
+    lines.append(f"return {', '.join(map(_made, several))}")
     given = ", ".join(f"A{k}" for k in range(len(shapes)))
     made: dict[str, Any] = {
         "array": np.array,
@@ -94,6 +100,12 @@ def _plan(formula: Callable[..., Any], shapes: tuple[Shape, ...]) -> Callable[..
     }
     exec("\n    ".join([f"def plan({given}):", *lines]), made)
     return made["plan"]
+
+
+def _made(A: Array) -> str:
+    """An array as source."""
+    flat = f"array({_listed(A.reshape(-1))})"
+    return flat if A.ndim == 1 else f"{flat}.reshape{A.shape}"
 
 
 def _listed(A: Array) -> str:

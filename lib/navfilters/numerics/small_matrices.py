@@ -128,8 +128,12 @@ def cholesky(A: Array) -> Array:
     array (..., n, n)
         NaN from the first pivot that is not positive, in the members that have none.
     """
-    n, alone = A.shape[-1], type(A) is np.ndarray and A.ndim == 2 and A.dtype.char == "d"
-    a = A.tolist() if alone else [[A[..., i, j] for j in range(i + 1)] for i in range(n)]
+    n = A.shape[-1]
+    alone = type(A) is np.ndarray and A.size == n * n and A.dtype.char == "d"
+    if alone:
+        a = A.reshape(n, n).tolist()
+    else:
+        a = [[A[..., i, j] for j in range(i + 1)] for i in range(n)]
     root = _root if alone else _roots
     zero = 0.0 if alone else a[0][0].__array_namespace__().zeros_like(a[0][0])
     L = [[zero] * n for _ in range(n)]
@@ -137,7 +141,7 @@ def cholesky(A: Array) -> Array:
         L[j][j] = root(a[j][j] - sum(L[j][k] * L[j][k] for k in range(j)))
         for i in range(j + 1, n):
             L[i][j] = (a[i][j] - sum(L[i][k] * L[j][k] for k in range(j))) / L[j][j]
-    return np.array(L) if alone else matrix(L)
+    return np.array(L).reshape(A.shape) if alone else matrix(L)
 
 
 def _root(pivot: float) -> float:
