@@ -29,9 +29,12 @@ def matmul(A: Array, B: Array) -> Array:
     Up to 2 x 2 the sum of the products of A's columns and B's rows, so that a member's last bits
     depend neither on the others nor on their number; larger ones are left to ``@``.
     """
-    if max(A.shape[-2], A.shape[-1], B.shape[-1]) > WRITTEN_OUT:
-        return A @ B
-    return written_out(A, B)
+    if max(A.shape[-2], A.shape[-1], B.shape[-1]) <= WRITTEN_OUT:
+        return written_out(A, B)
+    single = type(A) is type(B) is np.ndarray and A.ndim == B.ndim == 2
+    if single and A.flags.forc and B.flags.forc:
+        return A.dot(B)  # the same call of BLAS in a third of the time
+    return A @ B
 
 
 @partial(in_floats, longest=POINTS)
@@ -258,7 +261,9 @@ def _adjugate(A: Array) -> tuple[Array, Array]:
 def _solve(A: Array, B: Array) -> Array:
     """A^-1 B for a stack, by Gauss-Jordan elimination with partial pivoting."""
     xp, m = A.__array_namespace__(), A.shape[-1]
-    batch = xp.broadcast_shapes(A.shape[:-2], B.shape[:-2])
+    batch = A.shape[:-2]
+    if B.shape[:-2] != batch:
+        batch = xp.broadcast_shapes(batch, B.shape[:-2])
     if type(A) is type(B) is np.ndarray:
         return _by_elements(A, B, batch, m)
     work = xp.concat([xp.broadcast_to(X, (*batch, *X.shape[-2:])) for X in (A, B)], axis=-1)
@@ -277,18 +282,19 @@ def _by_elements(A: np.ndarray, B: np.ndarray, batch: tuple[int, ...], m: int) -
     """The same under NumPy: each element over all members, and none that is not needed again."""
     work = np.empty((m, m + B.shape[-1], *batch), np.result_type(A, B))
     for part, X in ((work[:, :m], A), (work[:, m:], B)):
-        part[...] = np.moveaxis(np.broadcast_to(X, (*batch, *X.shape[-2:])), (-2, -1), (0, 1))
+        elements = X.transpose(-2, -1, *range(X.ndim - 2))
+        part[...] = elements[(slice(None), slice(None), *(None,) * (work.ndim - X.ndim))]
     for j in range(m):
-        pivot = j + np.argmax(np.abs(work[j:, j]), axis=0)
+        pivot = j + np.abs(work[j:, j]).argmax(axis=0)
         for i in range(j + 1, m):
-            if (swap := pivot == i).any():
+            if (swap := pivot == i) is not np.False_ and swap.any():
                 one, other = work[j, j:].copy(), work[i, j:]
                 work[j, j:] = np.where(swap, other, one)
                 work[i, j:] = np.where(swap, one, other)
         work[j, j + 1 :] /= work[j, j]
         for i in {*range(m)} - {j}:
             work[i, j + 1 :] -= work[i, j] * work[j, j + 1 :]
-    return np.ascontiguousarray(np.moveaxis(work[:, m:], (0, 1), (-2, -1)))
+    return np.ascontiguousarray(work[:, m:].transpose(*range(2, work.ndim), 0, 1))
 
 
 def spectral_norm(A: Array) -> Array:
