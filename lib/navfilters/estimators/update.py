@@ -9,7 +9,7 @@ from navfilters.estimators import model_parts
 from navfilters.numerics import validation
 from navfilters.numerics.in_floats import in_floats
 from navfilters.numerics.matrix_roots import keep_exact, semidefinite_root
-from navfilters.numerics.small_matrices import WRITTEN_OUT, matmul, right_divide
+from navfilters.numerics.small_matrices import WRITTEN_OUT, identity, matmul, right_divide
 from navfilters.types import Array, Gaussian, Moments
 
 Form = Literal["joseph", "short", "sqrt"]
@@ -165,7 +165,7 @@ def _times(K: Array, y: Array) -> Array:
 
 
 def _joseph_covariance(P: Array, K: Array, H: Array, R: Array) -> Array:
-    rest = K.__array_namespace__().eye(K.shape[-2]) - matmul(K, H)
+    rest = identity(K) - matmul(K, H)
     cov = matmul(matmul(rest, P), rest.mT) + matmul(matmul(K, R), K.mT)
     return (cov + cov.mT) / 2
 

@@ -1,7 +1,7 @@
 """Products, factors and solutions of small matrices, batched: written out where that is faster."""
 
 import math
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -59,6 +59,30 @@ def written_out(A: Array, B: Array) -> Array:
     for i in range(1, A.shape[-1]):
         product += A[..., i : i + 1] * B[..., i : i + 1, :]  # in place where that can be
     return product
+
+
+def identity(A: Array) -> Array:
+    """The identity that has as many rows as A.
+
+    Parameters
+    ----------
+    A : array (..., n, m)
+
+    Returns
+    -------
+    array (n, n)
+        Under NumPy the same one for all, which cannot be written to.
+    """
+    if isinstance(A, np.ndarray):
+        return _identity(A.shape[-2])
+    return A.__array_namespace__().eye(A.shape[-2])
+
+
+@lru_cache
+def _identity(n: int) -> np.ndarray:
+    eye = np.eye(n)
+    eye.flags.writeable = False
+    return eye
 
 
 def outer_sum(a: Array, b: Array) -> Array:
