@@ -205,7 +205,7 @@ def unscented(
     else:  # what is known as a combination must not see the rounding of the mean
         dX = xp.where(is_singular(exact)[..., None], behind(dX, missing), X - prior.mean)
     W0_c, W_i = W0_c[..., None, None], W_i[..., None, None]
-    return Moments(z_hat, *spreads(R, dX, dZ, W0_c, W_i), exact=exact)
+    return Moments(z_hat, *spreads(dX, dZ, R, W0_c, W_i), exact=exact)
 
 
 cubature = partial(unscented, points=SigmaPoints(alpha=1.0, beta=0.0, kappa=0.0))

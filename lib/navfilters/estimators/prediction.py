@@ -131,7 +131,7 @@ def predict_unscented(
     dY = difference(dynamics, Y, mean)
     W = transition(dynamics, estimate, Q)[2] if hasattr(dynamics, "propagate") else Q
     W0_c, W_i = W0_c[..., None, None], W_i[..., None, None]
-    P = spread(W, dY, W0_c, W_i)
+    P = spread(dY, W, W0_c, W_i)
     return Gaussian(mean, (P + P.mT) / 2)
 
 

@@ -152,15 +152,15 @@ def _columns(mean: Array, gamma: Array, root: Array) -> Array:
 
 
 @partial(in_floats, longest=POINTS)
-def spread(noise: Array, dZ: Array, W0_c: Array, W_i: Array) -> Array:
+def spread(dZ: Array, noise: Array, W0_c: Array, W_i: Array) -> Array:
     """noise + sum W_c dZ dZ^T over the points, (..., m, m); weights (..., 1, 1)."""
     return noise + W0_c * outer_sum(dZ[:1], dZ[:1]) + W_i * outer_sum(dZ[1:], dZ[1:])
 
 
 @partial(in_floats, longest=POINTS)
-def spreads(noise: Array, dX: Array, dZ: Array, W0_c: Array, W_i: Array) -> tuple[Array, Array]:
+def spreads(dX: Array, dZ: Array, noise: Array, W0_c: Array, W_i: Array) -> tuple[Array, Array]:
     """The same, and sum W_c dX dZ^T, (..., n, m): dX is zero at the first point."""
-    return spread(noise, dZ, W0_c, W_i), W_i * outer_sum(dX[1:], dZ[1:])
+    return spread(dZ, noise, W0_c, W_i), W_i * outer_sum(dX[1:], dZ[1:])
 
 
 def behind(X: Array, missing: int) -> Array:
