@@ -149,18 +149,23 @@ ALONE = 2000
 
 
 def alone() -> dict[str, float]:
-    """Microseconds under NumPy of an update of one EKF, range and bearing, and of parts of it."""
+    """Microseconds under NumPy of an update of one filter, range and bearing, and of its parts."""
     setup = perea2007.Setup()
     prior, z, model = setup.prior, setup.z, setup.model
     H, R = model.jacobian(prior.mean), model.R
 
-    def ours(form: str) -> Callable[[int], object]:
-        ekf = replace(FILTERS["EKF"], form=form)
-        return lambda times: run(ekf, prior, z, model, times)
+    larger = Linear(np.random.default_rng(0).normal(size=(3, 6)), np.eye(3))
+    six, three = Gaussian(np.zeros(6), np.eye(6)), np.ones(3)
 
-    def theirs(h: Callable, jacobian: Callable) -> Callable[[int], object]:
-        ekf = ExtendedKalmanFilter(2, 2)
-        ekf.R = R
+    def ours(name: str, form: str = "joseph") -> Callable[[int], object]:
+        one = replace(FILTERS[name], form=form)
+        return lambda times: run(one, prior, z, model, times)
+
+    def theirs(
+        h: Callable, jacobian: Callable, prior: Gaussian = prior, z: np.ndarray = z
+    ) -> Callable[[int], object]:
+        ekf = ExtendedKalmanFilter(len(prior.mean), len(z))
+        ekf.R = R if len(z) == 2 else larger.R
 
         def updates(times: int) -> None:
             ekf.x, ekf.P = prior.mean.copy(), prior.cov.copy()
@@ -169,18 +174,28 @@ def alone() -> dict[str, float]:
 
         return updates
 
+    def their_ukf(times: int) -> object:
+        members = Gaussian(prior.mean[None], prior.cov[None])
+        return peers.filterpy("UKF")(members, z, R, times)()
+
     def repeated(part: Callable[[], object]) -> Callable[[int], object]:
         return lambda times: [part() for _ in range(times)]
 
     parts = {
-        "an update": ours("joseph"),
-        "an update in the short form": ours("short"),
+        "an update": ours("EKF"),
+        "an update in the short form": ours("EKF", "short"),
         "filterpy with the same model": theirs(model.h, model.jacobian),
         "filterpy with a bare model": theirs(peers.h, peers.jacobian),
         "h and its Jacobian": repeated(lambda: (model.h(prior.mean), model.jacobian(prior.mean))),
         "the same, bare": repeated(lambda: (peers.h(prior.mean), peers.jacobian(prior.mean))),
         "a product of 2 by 2": repeated(lambda: matmul(H, R)),
         "the same by BLAS": repeated(lambda: H @ R),
+        "an update of a UKF": ours("UKF"),
+        "filterpy's UKF with a bare model": their_ukf,
+        "an EKF of 6 states, 3 measurements": lambda times: run(
+            FILTERS["EKF"], six, three, larger, times
+        ),
+        "filterpy with the same model of 6": theirs(larger.h, larger.jacobian, six, three),
     }
     spent: dict[str, list[float]] = {what: [] for what in parts}
     for _ in range(REPEATS + 1):  # the first fills caches

@@ -1,5 +1,6 @@
 """Batches of priors: a member is what it is alone."""
 
+from dataclasses import replace
 from operator import itemgetter
 
 import numpy as np
@@ -12,7 +13,9 @@ from navfilters import (
     FILTERS,
     Gaussian,
     SigmaPoints,
+    run,
 )
+from navfilters.estimators import LATER_FILTERS
 from navfilters.models import RangeBearing
 
 
@@ -122,3 +125,16 @@ def test_an_indefinite_prior_does_not_stop_the_others(name):
     got = FILTERS[name](indefinite, z, model)
     assert np.isfinite(got.mean).all()
     assert np.isfinite(got.cov).all()
+
+
+@pytest.mark.parametrize("form", ["joseph", "short"])
+@pytest.mark.parametrize("name", [*FILTERS, *LATER_FILTERS])
+def test_two_states_have_the_same_bits_alone_and_in_any_company(name, form):
+    """One or two members are computed in floats, more of them by NumPy."""
+    prior, z, model = nonlinear()
+    estimator = replace({**FILTERS, **LATER_FILTERS}[name], form=form)
+    whole = run(estimator, prior, z, model, steps=5)
+    for some in (0, slice(1), slice(2)):
+        part = run(estimator, Gaussian(prior.mean[some], prior.cov[some]), z[some], model, steps=5)
+        assert_array_equal(part.mean, whole.mean[:, some])
+        assert_array_equal(part.cov, whole.cov[:, some])

@@ -1,8 +1,7 @@
 """How a measurement corrects a prior: at once, or by looking at the model again."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from navfilters.estimators.model_parts import difference, retract
 from navfilters.estimators.update import (
@@ -22,8 +21,7 @@ from navfilters.numerics.small_matrices import matmul, right_divide
 from navfilters.types import Array, Gaussian, Moments
 
 
-@dataclass(frozen=True, eq=False)
-class Observation:
+class Observation(NamedTuple):
     """A measurement, the prior that it corrects, and how a filter looks at both.
 
     Parameters
@@ -248,7 +246,8 @@ def recalibrated(seen: Observation, prior: Gaussian, moments: Moments, y: Array)
     jiang2024, with the gain that it keeps and the trace as the judge.
     """
     after = seen.corrected(prior, moments, y)
-    K = gain(seen.whole(moments, y)[0])
+    _, P_zz, P_xz, *_ = seen.whole(moments, y)[0]
+    K = gain(P_zz, P_xz)
     changed, again, _ = seen.again(Gaussian(after.mean, seen.prior.cov))
     cov = covariance_after(changed.cov, K, again, seen.form)
     if again.exact is not None:

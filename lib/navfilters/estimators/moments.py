@@ -3,9 +3,17 @@
 from functools import partial
 
 from navfilters.estimators.model_parts import hessian, jacobian, noise, residual, retract
-from navfilters.estimators.sigma_points import SigmaPoints, behind, is_singular, offsets, root_of
+from navfilters.estimators.sigma_points import (
+    SigmaPoints,
+    behind,
+    is_singular,
+    offsets,
+    root_of,
+    spreads,
+)
 from navfilters.numerics import validation
-from navfilters.numerics.small_matrices import matmul, outer_sum
+from navfilters.numerics.in_floats import in_floats
+from navfilters.numerics.small_matrices import matmul
 from navfilters.types import Array, Gaussian, MeasurementModel, Moments
 
 
@@ -33,8 +41,15 @@ def linearized(prior: Gaussian, model: MeasurementModel) -> Moments:
     H = jacobian(model, prior.mean)
     R = noise(model, prior.mean)
     validation.core("model.jacobian", H, (R.shape[-1], prior.cov.shape[-1]))
-    P_xz = matmul(prior.cov, H.mT)
-    return Moments(model.h(prior.mean), R + matmul(H, P_xz), P_xz, H, R)
+    P_zz, P_xz = _linear(prior.cov, H, R)
+    return Moments(model.h(prior.mean), P_zz, P_xz, H, R)
+
+
+@in_floats
+def _linear(P: Array, H: Array, R: Array) -> tuple[Array, Array]:
+    """P_zz and P_xz."""
+    P_xz = matmul(P, H.mT)
+    return R + matmul(H, P_xz), P_xz
 
 
 def second_order(prior: Gaussian, model: MeasurementModel) -> Moments:
@@ -190,8 +205,7 @@ def unscented(
     else:  # what is known as a combination must not see the rounding of the mean
         dX = xp.where(is_singular(exact)[..., None], behind(dX, missing), X - prior.mean)
     W0_c, W_i = W0_c[..., None, None], W_i[..., None, None]
-    P_zz = R + W0_c * outer_sum(dZ[:1], dZ[:1]) + W_i * outer_sum(dZ[1:], dZ[1:])
-    return Moments(z_hat, P_zz, W_i * outer_sum(dX[1:], dZ[1:]), exact=exact)
+    return Moments(z_hat, *spreads(dX, dZ, R, W0_c, W_i), exact=exact)
 
 
 cubature = partial(unscented, points=SigmaPoints(alpha=1.0, beta=0.0, kappa=0.0))

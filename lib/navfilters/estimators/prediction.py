@@ -10,8 +10,7 @@ from navfilters.estimators.moments import (
     second_order,
     unscented,
 )
-from navfilters.estimators.sigma_points import SigmaPoints, behind, offsets, root_of
-from navfilters.numerics.small_matrices import outer_sum
+from navfilters.estimators.sigma_points import SigmaPoints, behind, offsets, root_of, spread
 from navfilters.numerics.state_derivatives import first_derivative, second_derivative
 from navfilters.types import Array, Dynamics, Gaussian
 
@@ -132,7 +131,7 @@ def predict_unscented(
     dY = difference(dynamics, Y, mean)
     W = transition(dynamics, estimate, Q)[2] if hasattr(dynamics, "propagate") else Q
     W0_c, W_i = W0_c[..., None, None], W_i[..., None, None]
-    P = W + W0_c * outer_sum(dY[:1], dY[:1]) + W_i * outer_sum(dY[1:], dY[1:])
+    P = spread(dY, W, W0_c, W_i)
     return Gaussian(mean, (P + P.mT) / 2)
 
 

@@ -1,13 +1,15 @@
 """Where an unscented filter samples its prior, and how it weighs the samples."""
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, Literal
 
 import numpy as np
 
 from navfilters.numerics import validation
+from navfilters.numerics.in_floats import POINTS, in_floats
 from navfilters.numerics.matrix_roots import semidefinite_root, symmetric_root
+from navfilters.numerics.small_matrices import outer_sum
 from navfilters.types import Array, Gaussian
 
 
@@ -133,16 +135,32 @@ def sigma_points(prior: Gaussian, points: SigmaPoints) -> Array:
 
 def offsets(prior: Gaussian, points: SigmaPoints, root: Array) -> Array:
     """What the points have that the mean has not, with all the batch axes of both."""
-    xp = prior.cov.__array_namespace__()
-    n = prior.cov.shape[-1]
-    gamma, *_ = points.weights(n, xp)
+    gamma, *_ = points.weights(root.shape[-1], root.__array_namespace__())
     if gamma.ndim:
         validation.batch(points=gamma.shape, prior=root.shape[:-2])
-    S = gamma[..., None, None] * root
-    batch = xp.broadcast_shapes(S.shape[:-2], prior.mean.shape[:-1])
+    return _columns(prior.mean, gamma[..., None, None], root)
+
+
+@in_floats
+def _columns(mean: Array, gamma: Array, root: Array) -> Array:
+    """Nothing, then each column of gamma root, then minus each of them."""
+    xp, S = root.__array_namespace__(), gamma * root
+    batch = xp.broadcast_shapes(S.shape[:-2], mean.shape[:-1])
     k = len(batch) + 1
-    columns = xp.permute_dims(xp.broadcast_to(S, (*batch, n, n)), (k, *range(k)))
+    columns = xp.permute_dims(xp.broadcast_to(S, (*batch, *S.shape[-2:])), (k, *range(k)))
     return xp.concat([xp.zeros_like(columns[:1]), columns, -columns], axis=0)
+
+
+@partial(in_floats, longest=POINTS)
+def spread(dZ: Array, noise: Array, W0_c: Array, W_i: Array) -> Array:
+    """noise + sum W_c dZ dZ^T over the points, (..., m, m); weights (..., 1, 1)."""
+    return noise + W0_c * outer_sum(dZ[:1], dZ[:1]) + W_i * outer_sum(dZ[1:], dZ[1:])
+
+
+@partial(in_floats, longest=POINTS)
+def spreads(dX: Array, dZ: Array, noise: Array, W0_c: Array, W_i: Array) -> tuple[Array, Array]:
+    """The same, and sum W_c dX dZ^T, (..., n, m): dX is zero at the first point."""
+    return spread(dZ, noise, W0_c, W_i), W_i * outer_sum(dX[1:], dZ[1:])
 
 
 def behind(X: Array, missing: int) -> Array:

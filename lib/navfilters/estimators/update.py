@@ -7,8 +7,9 @@ import numpy as np
 
 from navfilters.estimators import model_parts
 from navfilters.numerics import validation
+from navfilters.numerics.in_floats import in_floats
 from navfilters.numerics.matrix_roots import keep_exact, semidefinite_root
-from navfilters.numerics.small_matrices import WRITTEN_OUT, matmul, right_divide
+from navfilters.numerics.small_matrices import WRITTEN_OUT, identity, matmul, right_divide
 from navfilters.types import Array, Gaussian, Moments
 
 Form = Literal["joseph", "short", "sqrt"]
@@ -95,7 +96,8 @@ def innovation(z: Array, moments: Moments, model: Any) -> Array:
 def absent(z: Array) -> Array | None:
     """Which components were not measured, (..., m); None where it is known that all were."""
     if type(z) is np.ndarray:
-        squares = np.vdot(z, z)  # NaN where one of them is, in a fifth of the time
+        # NaN where one of them is, in a fifth of the time.
+        squares = z.dot(z) if z.ndim == 1 else np.vdot(z, z)
         return np.isnan(z) if squares != squares else None
     if COMPLETE.get() and validation.traced(z):
         return None
@@ -121,20 +123,51 @@ def correct(
     prior: Gaussian, y: Array, moments: Moments, form: Form, model: Any, gone: Array | None
 ) -> Gaussian:
     """The update of :func:`kalman_update` by an innovation y, of which so much was not measured."""
-    xp = moments.P_zz.__array_namespace__()
     if gone is not None:
+        xp = y.__array_namespace__()
         y, moments = xp.where(gone, 0.0, y), measured(moments, gone)
+    _, P_zz, P_xz, H, R, _ = moments
     if form == "sqrt":
-        K, cov = by_array(prior.cov, moments)
+        dx, cov = _by_array(prior.cov, y, moments)
+    elif form == "joseph" and H is not None:
+        dx, cov = _joseph(prior.cov, y, P_zz, P_xz, H, R)
     else:
-        K = gain(moments)
-        if form == "joseph" and moments.H is not None:
-            cov = covariance_after(prior.cov, K, moments, form)
-        else:
-            reduction = matmul(K, moments.P_xz.mT)
-            cov = prior.cov - (reduction + reduction.mT) / 2
-    mean = model_parts.retract(model, prior.mean, matmul(K, y[..., None])[..., 0])
+        dx, cov = _short(prior.cov, y, P_zz, P_xz)
+    mean = model_parts.retract(model, prior.mean, dx)
     return Gaussian(mean, cov if moments.exact is None else keep_exact(cov, moments.exact))
+
+
+@in_floats
+def _joseph(
+    P: Array, y: Array, P_zz: Array, P_xz: Array, H: Array, R: Array
+) -> tuple[Array, Array]:
+    """How far the mean goes, (..., n), and the covariance after it, in Joseph's form."""
+    K = gain(P_zz, P_xz)
+    return _times(K, y), _joseph_covariance(P, K, H, R)
+
+
+@in_floats
+def _short(P: Array, y: Array, P_zz: Array, P_xz: Array) -> tuple[Array, Array]:
+    """The same in the form of the equations."""
+    K = gain(P_zz, P_xz)
+    reduction = matmul(K, P_xz.mT)
+    return _times(K, y), P - (reduction + reduction.mT) / 2
+
+
+def _by_array(P: Array, y: Array, moments: Moments) -> tuple[Array, Array]:
+    """The same by a triangular factor."""
+    K, cov = by_array(P, moments)
+    return _times(K, y), cov
+
+
+def _times(K: Array, y: Array) -> Array:
+    return matmul(K, y[..., None])[..., 0]
+
+
+def _joseph_covariance(P: Array, K: Array, H: Array, R: Array) -> Array:
+    rest = identity(K) - matmul(K, H)
+    cov = matmul(matmul(rest, P), rest.mT) + matmul(matmul(K, R), K.mT)
+    return (cov + cov.mT) / 2
 
 
 def covariance_after(P: Array, K: Array, moments: Moments, form: Form) -> Array:
@@ -144,12 +177,9 @@ def covariance_after(P: Array, K: Array, moments: Moments, form: Form) -> Array:
         A = join([root - matmul(K, matmul(H, root)), matmul(K, noise_root)], -1)
         return matmul(A, A.mT)
     if form == "joseph" and moments.H is not None:
-        xp = K.__array_namespace__()
-        rest = xp.eye(K.shape[-2]) - matmul(K, moments.H)
-        cov = matmul(matmul(rest, P), rest.mT) + matmul(matmul(K, moments.R), K.mT)
-    else:
-        reduction = matmul(K, moments.P_xz.mT)
-        cov = P - reduction - reduction.mT + matmul(matmul(K, moments.P_zz), K.mT)
+        return _joseph_covariance(P, K, moments.H, moments.R)
+    reduction = matmul(K, moments.P_xz.mT)
+    cov = P - reduction - reduction.mT + matmul(matmul(K, moments.P_zz), K.mT)
     return (cov + cov.mT) / 2
 
 
@@ -194,12 +224,11 @@ def join(parts: list[Array], axis: int) -> Array:
     return xp.concat([xp.broadcast_to(A, (*batch, *A.shape[-2:])) for A in parts], axis=axis)
 
 
-def gain(moments: Moments) -> Array:
-    """K = P_xz P_zz^-1, (..., n, m); rows and columns of unit variance where BLAS has it."""
-    S = moments.P_zz
+def gain(S: Array, P_xz: Array) -> Array:
+    """K = P_xz S^-1, (..., n, m); rows and columns of unit variance where BLAS has it."""
     if S.shape[-1] <= WRITTEN_OUT:
-        return right_divide(moments.P_xz, S)
+        return right_divide(P_xz, S)
     xp = S.__array_namespace__()
     variance = xp.abs(xp.linalg.diagonal(S))
     scale = (1 / xp.sqrt(xp.where(variance > 0, variance, 1.0)))[..., None, :]
-    return right_divide(moments.P_xz * scale, scale.mT * S * scale) * scale
+    return right_divide(P_xz * scale, scale.mT * S * scale) * scale

@@ -5,6 +5,7 @@ from math import pi
 
 from navfilters.numerics import validation
 from navfilters.numerics.analytic import atan2, hypot
+from navfilters.numerics.in_floats import in_floats
 from navfilters.numerics.small_matrices import matrix, vector
 from navfilters.types import Array
 
@@ -55,8 +56,7 @@ class RangeBearing:
         array (..., 2)
             Range in units, bearing in radians.
         """
-        x1, x2 = x[..., 0], x[..., 1]
-        return vector([hypot(x1, x2), atan2(x2, x1)])
+        return _polar(x)
 
     def residual(self, z: Array, z_hat: Array) -> Array:
         """z minus z_hat, (..., 2), the bearing's in (-pi, pi] with ``wrap``.
@@ -69,12 +69,7 @@ class RangeBearing:
         -------
         array (..., 2)
         """
-        y = z - z_hat
-        if not self.wrap:
-            return y
-        xp = y.__array_namespace__()
-        turns = xp.ceil(y[..., 1] / (2 * pi) - 0.5)
-        return vector([y[..., 0], y[..., 1] - 2 * pi * turns])
+        return _wrapped(z, z_hat) if self.wrap else z - z_hat
 
     def jacobian(self, x: Array) -> Array:
         """First derivatives, (..., 2, 2): rows range and bearing, columns x1 and x2.
@@ -87,10 +82,7 @@ class RangeBearing:
         -------
         array (..., 2, 2)
         """
-        x1, x2 = x[..., 0], x[..., 1]
-        r = hypot(x1, x2)
-        c, s = x1 / r, x2 / r
-        return matrix([[c, s], [-s / r, c / r]])
+        return _derivatives(x)
 
     def hessian(self, x: Array) -> Array:
         """Second derivatives of range and of bearing, (..., 2, 2, 2).
@@ -111,3 +103,24 @@ class RangeBearing:
         sin_2, cos_2 = 2 * s * c, c * c - s * s
         of_bearing = matrix([[sin_2, -cos_2], [-cos_2, -sin_2]]) / (r * r)[..., None, None]
         return xp.moveaxis(xp.stack([of_range, of_bearing]), 0, -3)
+
+
+@in_floats
+def _polar(x: Array) -> Array:
+    x1, x2 = x[..., 0], x[..., 1]
+    return vector([hypot(x1, x2), atan2(x2, x1)])
+
+
+@in_floats
+def _wrapped(z: Array, z_hat: Array) -> Array:
+    y = z - z_hat
+    turns = y.__array_namespace__().ceil(y[..., 1] / (2 * pi) - 0.5)
+    return vector([y[..., 0], y[..., 1] - 2 * pi * turns])
+
+
+@in_floats
+def _derivatives(x: Array) -> Array:
+    x1, x2 = x[..., 0], x[..., 1]
+    r = hypot(x1, x2)
+    c, s = x1 / r, x2 / r
+    return matrix([[c, s], [-s / r, c / r]])

@@ -1,12 +1,14 @@
 """Products, factors and solutions of small matrices, batched: written out where that is faster."""
 
 import math
+from functools import lru_cache, partial
 
 import numpy as np
 
+from navfilters.numerics.in_floats import POINTS, SMALL, in_floats
 from navfilters.types import Array
 
-WRITTEN_OUT = 2
+WRITTEN_OUT = SMALL
 """Largest size of the matrices whose products are written out; above, BLAS is as fast."""
 
 
@@ -27,19 +29,15 @@ def matmul(A: Array, B: Array) -> Array:
     Up to 2 x 2 the sum of the products of A's columns and B's rows, so that a member's last bits
     depend neither on the others nor on their number; larger ones are left to ``@``.
     """
-    if max(A.shape[-2], A.shape[-1], B.shape[-1]) > WRITTEN_OUT:
-        return A @ B
-    if A.shape[-1] == 2 and _alone(A) and _alone(B):
-        columns = B.T.tolist()
-        return np.array([[a * c + b * d for c, d in columns] for a, b in A.tolist()])
-    return written_out(A, B)
+    if max(A.shape[-2], A.shape[-1], B.shape[-1]) <= WRITTEN_OUT:
+        return written_out(A, B)
+    single = type(A) is type(B) is np.ndarray and A.ndim == B.ndim == 2
+    if single and A.flags.forc and B.flags.forc:
+        return A.dot(B)  # the same call of BLAS in a third of the time
+    return A @ B
 
 
-def _alone(A: Array) -> bool:
-    """One matrix of doubles under NumPy: the same bits by Python's floats, in less time."""
-    return type(A) is np.ndarray and A.ndim == 2 and A.dtype.char == "d" and A.size > 0
-
-
+@partial(in_floats, longest=POINTS)
 def written_out(A: Array, B: Array) -> Array:
     """A B as a sum of products of A's columns and B's rows, whatever their size.
 
@@ -61,6 +59,30 @@ def written_out(A: Array, B: Array) -> Array:
     for i in range(1, A.shape[-1]):
         product += A[..., i : i + 1] * B[..., i : i + 1, :]  # in place where that can be
     return product
+
+
+def identity(A: Array) -> Array:
+    """The identity that has as many rows as A.
+
+    Parameters
+    ----------
+    A : array (..., n, m)
+
+    Returns
+    -------
+    array (n, n)
+        Under NumPy the same one for all, which cannot be written to.
+    """
+    if isinstance(A, np.ndarray):
+        return _identity(A.shape[-2])
+    return A.__array_namespace__().eye(A.shape[-2])
+
+
+@lru_cache
+def _identity(n: int) -> np.ndarray:
+    eye = np.eye(n)
+    eye.flags.writeable = False
+    return eye
 
 
 def outer_sum(a: Array, b: Array) -> Array:
@@ -133,8 +155,12 @@ def cholesky(A: Array) -> Array:
     array (..., n, n)
         NaN from the first pivot that is not positive, in the members that have none.
     """
-    n, alone = A.shape[-1], _alone(A)
-    a = A.tolist() if alone else [[A[..., i, j] for j in range(i + 1)] for i in range(n)]
+    n = A.shape[-1]
+    alone = type(A) is np.ndarray and A.size == n * n and A.dtype.char == "d"
+    if alone:
+        a = A.reshape(n, n).tolist()
+    else:
+        a = [[A[..., i, j] for j in range(i + 1)] for i in range(n)]
     root = _root if alone else _roots
     zero = 0.0 if alone else a[0][0].__array_namespace__().zeros_like(a[0][0])
     L = [[zero] * n for _ in range(n)]
@@ -142,7 +168,7 @@ def cholesky(A: Array) -> Array:
         L[j][j] = root(a[j][j] - sum(L[j][k] * L[j][k] for k in range(j)))
         for i in range(j + 1, n):
             L[i][j] = (a[i][j] - sum(L[i][k] * L[j][k] for k in range(j))) / L[j][j]
-    return np.array(L) if alone else matrix(L)
+    return np.array(L).reshape(A.shape) if alone else matrix(L)
 
 
 def _root(pivot: float) -> float:
@@ -174,8 +200,11 @@ def whitened_square(L: Array, y: Array) -> Array:
     return sum(x * x for x in w)
 
 
+EPS = float(np.finfo(float).eps)
+
+
 def _rounding(n: int) -> float:
-    return 8 * n * float(np.finfo(float).eps)
+    return 8 * n * EPS
 
 
 def _deferred_cholesky(A: Array) -> tuple[Array, Array, Array]:
@@ -241,19 +270,24 @@ def right_divide(B: Array, A: Array) -> Array:
     if m == 1:
         return B / A
     if m == 2:
-        if _alone(A):
-            (a, b), (c, d) = A.tolist()
-            return matmul(B, np.array([[d, -b], [-c, a]])) / np.float64(a * d - b * c)
-        a, b, c, d = A[..., 0, 0], A[..., 0, 1], A[..., 1, 0], A[..., 1, 1]
-        adjugate = matrix([[d, -b], [-c, a]])
-        return matmul(B, adjugate) / (a * d - b * c)[..., None, None]
+        adjugate, determinant = _adjugate(A)
+        return matmul(B, adjugate) / determinant
     return _solve(A.mT, B.mT).mT
+
+
+@in_floats
+def _adjugate(A: Array) -> tuple[Array, Array]:
+    """That of 2 x 2, and the determinant (..., 1, 1)."""
+    a, b, c, d = A[..., 0, 0], A[..., 0, 1], A[..., 1, 0], A[..., 1, 1]
+    return matrix([[d, -b], [-c, a]]), (a * d - b * c)[..., None, None]
 
 
 def _solve(A: Array, B: Array) -> Array:
     """A^-1 B for a stack, by Gauss-Jordan elimination with partial pivoting."""
     xp, m = A.__array_namespace__(), A.shape[-1]
-    batch = xp.broadcast_shapes(A.shape[:-2], B.shape[:-2])
+    batch = A.shape[:-2]
+    if B.shape[:-2] != batch:
+        batch = xp.broadcast_shapes(batch, B.shape[:-2])
     if type(A) is type(B) is np.ndarray:
         return _by_elements(A, B, batch, m)
     work = xp.concat([xp.broadcast_to(X, (*batch, *X.shape[-2:])) for X in (A, B)], axis=-1)
@@ -272,18 +306,19 @@ def _by_elements(A: np.ndarray, B: np.ndarray, batch: tuple[int, ...], m: int) -
     """The same under NumPy: each element over all members, and none that is not needed again."""
     work = np.empty((m, m + B.shape[-1], *batch), np.result_type(A, B))
     for part, X in ((work[:, :m], A), (work[:, m:], B)):
-        part[...] = np.moveaxis(np.broadcast_to(X, (*batch, *X.shape[-2:])), (-2, -1), (0, 1))
+        elements = X.transpose(-2, -1, *range(X.ndim - 2))
+        part[...] = elements[(slice(None), slice(None), *(None,) * (work.ndim - X.ndim))]
     for j in range(m):
-        pivot = j + np.argmax(np.abs(work[j:, j]), axis=0)
+        pivot = j + np.abs(work[j:, j]).argmax(axis=0)
         for i in range(j + 1, m):
-            if (swap := pivot == i).any():
+            if (swap := pivot == i) is not np.False_ and swap.any():
                 one, other = work[j, j:].copy(), work[i, j:]
                 work[j, j:] = np.where(swap, other, one)
                 work[i, j:] = np.where(swap, one, other)
         work[j, j + 1 :] /= work[j, j]
         for i in {*range(m)} - {j}:
             work[i, j + 1 :] -= work[i, j] * work[j, j + 1 :]
-    return np.ascontiguousarray(np.moveaxis(work[:, m:], (0, 1), (-2, -1)))
+    return np.ascontiguousarray(work[:, m:].transpose(*range(2, work.ndim), 0, 1))
 
 
 def spectral_norm(A: Array) -> Array:
