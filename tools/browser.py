@@ -137,15 +137,17 @@ class Site:
 
     @contextmanager
     def _tab(self) -> Iterator[Page]:
-        """A tab of a first visit, but for what all pages load: one that was used has that at hand.
-
-        After a failure it is not used again.
-        """
+        """A tab as on a first visit; one that was used has at hand what all pages load."""
         page = self.free.pop() if self.free else self.context.new_page()
-        page.emulate_media(media="null", color_scheme="light")
-        yield page
-        page.evaluate(FORGET)
-        page.goto("about:blank")
+        try:
+            page.emulate_media(media="null", color_scheme="light")
+            yield page
+            page.mouse.move(0, 0)
+            page.evaluate(FORGET)
+            page.goto("about:blank")
+        except BaseException:
+            page.close()
+            raise
         self.free.append(page)
 
 

@@ -60,7 +60,8 @@ PLAIN = """() => {
     const listings = [...document.querySelectorAll(`${code}:not(${code} *)`)].map(own => {
         const plain = own.cloneNode(true);
         for (const word of [...plain.querySelectorAll('span')].reverse()) {  // inner ones first
-            if (!word.matches('[data-look], [id], :has(*)')) word.replaceWith(word.textContent);
+            if (!word.children.length && word.getAttributeNames().join() == 'class')
+                word.replaceWith(word.textContent);
         }
         return [own, plain];
     });
