@@ -11,7 +11,7 @@ from threading import Thread
 from typing import Any
 
 import yaml
-from playwright.sync_api import Browser, Page, Request, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Error, Page, Request, sync_playwright
 
 ROOT = Path(__file__).resolve().parent.parent
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -28,6 +28,7 @@ ARGS = [
 BARS = ["--hide-scrollbars"]  # what Playwright asks for, and tests of what scrolls must not
 # The theme's own storage keys. Without them it follows the system, as on a first visit.
 REMEMBER = "localStorage.setItem('mode', '{0}'); localStorage.setItem('theme', '{0}')"
+FORGET = "() => { localStorage.clear(); sessionStorage.clear() }"
 STILL = "*, ::before, ::after { transition: none !important; animation: none !important }"
 SETTLED = "async () => { await window.MathJax?.startup?.promise; await document.fonts.ready }"
 
@@ -82,6 +83,7 @@ class Visit:
     """A loaded page, and what went wrong while it loaded."""
 
     page: Page
+    theme: str
     outside: list[str] = field(default_factory=list)
     errors: list[str] = field(default_factory=list)
 
@@ -91,39 +93,62 @@ class Site:
     """A browser, and the address of the built pages."""
 
     browser: Browser
+    context: BrowserContext
     address: str
+    free: list[Page] = field(default_factory=list)
 
     @contextmanager
     def visit(self, name: str, width: int = 1280, theme: str = "") -> Iterator[Visit]:
         """Load a page and wait for MathJax; requests to any other host, which fail, are kept."""
-        context = self.browser.new_context(
-            viewport={"width": width, "height": 900}, color_scheme=theme or "light"
-        )
-        if theme:
-            context.add_init_script(REMEMBER.format(theme))
-        visit = Visit(context.new_page())
         home = self.address + "/"
+        with self._remembering(theme) if theme else self._tab() as page:
+            visit = Visit(page, theme or "light")
 
-        def note(request: Request) -> None:
-            if not request.url.startswith((home, "blob:")):
-                visit.outside.append(request.url)
+            def note(request: Request) -> None:
+                if not request.url.startswith((home, "blob:")):
+                    visit.outside.append(request.url)
 
-        def listen(message: Any) -> None:
-            if message.type == "error" and message.location["url"] not in visit.outside:
-                visit.errors.append(f"console: {message.text} ({message.location['url']})")
+            def listen(message: Any) -> None:
+                if message.type == "error" and message.location["url"] not in visit.outside:
+                    visit.errors.append(f"console: {message.text} ({message.location['url']})")
 
-        visit.page.on("request", note)
-        visit.page.on("pageerror", lambda error: visit.errors.append(f"script: {error}"))
-        visit.page.on("console", listen)
-        try:
-            response = visit.page.goto(f"{home}{name}.html")
+            def fail(error: Error) -> None:
+                visit.errors.append(f"script: {error}")
+
+            heard = {"request": note, "pageerror": fail, "console": listen}
+            for event, hear in heard.items():
+                page.on(event, hear)
+            page.set_viewport_size({"width": width, "height": 900})
+            response = page.goto(f"{home}{name}.html")
             if response is None or not response.ok:
                 raise FileNotFoundError(f"{name}.html is not built: run `make book`")
-            visit.page.add_style_tag(content=STILL)
-            visit.page.evaluate(SETTLED)
+            page.add_style_tag(content=STILL)
+            page.evaluate(SETTLED)
             yield visit
-        finally:
-            context.close()
+            for event, hear in heard.items():
+                page.remove_listener(event, hear)
+
+    @contextmanager
+    def _remembering(self, theme: str) -> Iterator[Page]:
+        """A tab of somebody who chose a theme on an earlier visit."""
+        with self.browser.new_context(color_scheme=theme) as context:
+            context.add_init_script(REMEMBER.format(theme))
+            yield context.new_page()
+
+    @contextmanager
+    def _tab(self) -> Iterator[Page]:
+        """A tab as on a first visit; one that was used has at hand what all pages load."""
+        page = self.free.pop() if self.free else self.context.new_page()
+        try:
+            page.emulate_media(media="null", color_scheme="light")
+            yield page
+            page.mouse.move(0, 0)
+            page.evaluate(FORGET)
+            page.goto("about:blank")
+        except BaseException:
+            page.close()
+            raise
+        self.free.append(page)
 
 
 @contextmanager
@@ -134,6 +159,6 @@ def site(folder: Path) -> Iterator[Site]:
             executable_path=find(), args=ARGS, ignore_default_args=BARS
         )
         try:
-            yield Site(browser, address)
+            yield Site(browser, browser.new_context(), address)
         finally:
             browser.close()

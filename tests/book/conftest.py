@@ -11,6 +11,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 PAGES = set(chromium.toc())
 DRAWN = "() => new Promise(drawn => requestAnimationFrame(() => requestAnimationFrame(drawn)))"
+FOLLOWS = "theme => document.documentElement.dataset.theme == theme"
 OPEN = """document.querySelectorAll('.bd-article details').forEach(fold => { fold.open = true; })"""
 
 
@@ -66,16 +67,36 @@ def _as_wide_as(visit, width):
     return visit
 
 
+def _in(visit, theme):
+    if visit.theme != theme:
+        visit.page.emulate_media(color_scheme=theme)
+        visit.page.wait_for_function(FOLLOWS, arg=theme)
+        visit.theme = theme
+    return visit
+
+
 @pytest.fixture
 def wide(loaded):
     """A page on a wide screen."""
-    return _as_wide_as(loaded, 1280)
+    return _in(_as_wide_as(loaded, 1280), "light")
+
+
+@pytest.fixture
+def dark(loaded):
+    """The same page in the dark."""
+    return _in(_as_wide_as(loaded, 1280), "dark")
 
 
 @pytest.fixture
 def narrow(loaded):
-    """The same page on a telephone's: no script looks at the width while a page loads."""
+    """The same page on a telephone's screen, in whatever theme: no script looks at the width."""
     return _as_wide_as(loaded, 390)
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest puts the tests of a page together
+def pytest_collection_modifyitems(items):
+    """Of each page first what is seen wide and light, then dark, then narrow: two changes."""
+    items.sort(key=lambda item: [name in item.fixturenames for name in ("narrow", "dark")])
 
 
 class ByPage(LoadScopeScheduling):
