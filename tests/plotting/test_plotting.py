@@ -212,3 +212,24 @@ def test_tails_of_the_nees():
     assert ax.get_xlim()[0] == 0
     assert ax.get_xlim()[1] > 150
     plt.close(figure)
+
+
+def test_a_cell_draws_its_figures_only_to_show_them():
+    """The notebook does that when the cell ends; pyplot would draw them before, for nobody."""
+    nbformat = pytest.importorskip("nbformat")
+    nbclient = pytest.importorskip("nbclient")
+    cells = (
+        "from matplotlib.backends.backend_agg import FigureCanvasAgg as Canvas\n"
+        "from matplotlib import pyplot as plt\n"
+        "from navfilters.book import plotting\n"
+        "drawn, Canvas.draw_idle = [], lambda canvas: drawn.append(canvas)\n"
+        "plotting.use_style()",
+        "_ = plt.plot([0, 1])",
+        "_ = plt.plot([1, 0])",
+        "print(len(drawn))",
+    )
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
+    nbclient.NotebookClient(notebook, timeout=120).execute()
+    _, one, other, count = (cell.outputs for cell in notebook.cells)
+    assert all("image/png" in output.data for (output,) in (one, other))
+    assert count[0].text == "0\n"

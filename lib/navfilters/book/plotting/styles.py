@@ -108,3 +108,6 @@ def use_style() -> None:
             "legend.frameon": False,
         }
     )
+    if "inline" in plt.get_backend():  # it renders a cell's figures; pyplot would draw them before
+        plt.switch_backend(plt.get_backend())  # else the first figure does, and connects again
+        plt.uninstall_repl_displayhook()
