@@ -108,6 +108,27 @@ def use_style() -> None:
             "legend.frameon": False,
         }
     )
-    if "inline" in plt.get_backend():  # it renders a cell's figures; pyplot would draw them before
-        plt.switch_backend(plt.get_backend())  # else the first figure does, and connects again
-        plt.uninstall_repl_displayhook()
+    if "inline" in plt.get_backend():
+        _draw_to_show()
+
+
+def _draw_to_show() -> None:
+    """Let a notebook draw a cell's figures when it shows them, and pyplot not once before."""
+    from IPython import get_ipython
+
+    shell = get_ipython()
+    if shell is None:  # a script that a notebook started has its backend
+        return
+    plt.switch_backend(plt.get_backend())  # else the first figure does, and connects again
+    plt.uninstall_repl_displayhook()
+    hooks = shell.events.callbacks["post_execute"]
+    if _lay_out not in hooks:
+        hooks.insert(0, _lay_out)  # registered, it would come when they have been shown
+
+
+def _lay_out() -> None:
+    """What figures keep of a drawing: a constrained layout is still better the second time."""
+    for number in plt.get_fignums():
+        figure = plt.figure(number)
+        if engine := figure.get_layout_engine():
+            engine.execute(figure)
