@@ -229,7 +229,7 @@ def test_a_cell_draws_its_figures_only_to_show_them():
         figure,
         "print(len(drawn))\nplt.install_repl_displayhook()\n"
         "hooks = get_ipython().events.callbacks['post_execute']\n"
-        "hooks.insert(0, hooks.pop())\nhooks.remove(plotting.styles._lay_out)",
+        "hooks.insert(0, hooks.pop())\nhooks.remove(plotting.styles._lay_all_out)",
         figure,
         "print(len(drawn))",
     )

@@ -258,11 +258,12 @@ def dynamics(model: Any, prior: Gaussian) -> None:
     state, square = mean.shape[-1:], (n, n)
     if "f" in known:
         alike("dynamics.f", model.f, mean, state, own, whole=True)
+    states = 1 + 2 * n + mean.shape[-1]  # longer than any axis of any part
     for name, count in (("transition", 2), ("propagate", 3)):
         if name in known:
             called = f"dynamics.{name}"
             of_x, of_F, *of_W = parts(name, count)
-            alike(f"f(x) of {called}", of_x, mean, state, own, whole=True)
+            alike(f"f(x) of {called}", of_x, mean, state, own, whole=True, count=states)
             alike(f"F of {called}", of_F, mean, square, own, whole=False)
             for W in of_W:
                 alike(f"W of {called}", W, mean, square, own, whole=False)

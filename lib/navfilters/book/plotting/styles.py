@@ -122,13 +122,19 @@ def _draw_to_show() -> None:
     plt.switch_backend(plt.get_backend())  # else the first figure does, and connects again
     plt.uninstall_repl_displayhook()
     hooks = shell.events.callbacks["post_execute"]
-    if _lay_out not in hooks:
-        hooks.insert(0, _lay_out)  # registered, it would come when they have been shown
+    if _lay_all_out not in hooks:
+        hooks.insert(0, _lay_all_out)  # registered, it would come when they have been shown
 
 
-def _lay_out() -> None:
+def _lay_all_out() -> None:
     """What figures keep of a drawing: a constrained layout is still better the second time."""
     for number in plt.get_fignums():
-        figure = plt.figure(number)
-        if engine := figure.get_layout_engine():
-            engine.execute(figure)
+        lay_out(plt.figure(number))
+
+
+def lay_out(figure: Any) -> None:
+    """Put a figure's axes where a drawing would, which costs half of it if there is a layout."""
+    if engine := figure.get_layout_engine():
+        engine.execute(figure)
+    else:
+        figure.draw_without_rendering()
