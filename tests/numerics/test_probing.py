@@ -149,3 +149,18 @@ def test_an_empty_batch_is_looked_at_with_ones():
     dynamics(still, empty)
     with pytest.raises(ValueError, match=r"model.h must"):
         sensor(Model(h=lambda x: x[..., :1]), empty)
+
+
+def test_what_has_three_values_is_asked_once_at_each_state():
+    """Propagation may cost as much as a step of the filter, and its parts are looked at in turn."""
+    asked = []
+
+    def propagate(x, Q):
+        asked.append((x.shape, x.tobytes()))
+        F = np.broadcast_to(np.eye(2), (*x.shape, 2))
+        return x, F, F + Q
+
+    means = np.random.default_rng(0).normal(size=(3, 2))
+    moving = SimpleNamespace(Q=np.eye(2), propagate=propagate)
+    dynamics(moving, Gaussian(means, np.eye(2)))
+    assert len(asked) == len(set(asked)) > 1

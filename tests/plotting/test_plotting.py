@@ -212,3 +212,29 @@ def test_tails_of_the_nees():
     assert ax.get_xlim()[0] == 0
     assert ax.get_xlim()[1] > 150
     plt.close(figure)
+
+
+def test_a_cell_draws_its_figures_only_to_show_them():
+    """To the pixel as if pyplot had drawn them before, which it does where it is connected."""
+    nbformat = pytest.importorskip("nbformat")
+    nbclient = pytest.importorskip("nbclient")
+    figure = "_, axes = plt.subplots(2, 2)\n_ = axes[0, 1].semilogy([1, 1e9], label='a')"
+    cells = (
+        "from matplotlib.backends.backend_agg import FigureCanvasAgg as Canvas\n"
+        "from matplotlib import pyplot as plt\n"
+        "from navfilters.book import plotting\n"
+        "drawn = []\n"
+        "Canvas.draw_idle = lambda canvas: (drawn.append(canvas), canvas.draw())\n"
+        "plotting.use_style()",
+        figure,
+        "print(len(drawn))\nplt.install_repl_displayhook()\n"
+        "hooks = get_ipython().events.callbacks['post_execute']\n"
+        "hooks.insert(0, hooks.pop())\nhooks.remove(plotting.styles._lay_all_out)",
+        figure,
+        "print(len(drawn))",
+    )
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
+    nbclient.NotebookClient(notebook, timeout=120).execute()
+    _, (here,), (none,), (as_ever,), (one,) = (cell.outputs for cell in notebook.cells)
+    assert (none.text, one.text) == ("0\n", "1\n")
+    assert here.data["image/png"] == as_ever.data["image/png"]

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from navfilters.numerics.chi_square import quantile
 from navfilters.types import Array
 
 LAGS = 10
@@ -65,7 +66,7 @@ def channel(number: int, y: Array, variance: Array, white: Array, tail: float) -
     -------
     Channel
     """
-    from scipy import stats
+    from scipy.special import stdtrit  # see quantile
 
     with np.errstate(invalid="ignore"):
         r = y / np.sqrt(np.where(variance > 0, variance, np.nan))
@@ -75,9 +76,9 @@ def channel(number: int, y: Array, variance: Array, white: Array, tail: float) -
         four = (nothing,) * 4
         return Channel(number, 0, *four, (nothing,) * 3, 0.0, 0, 0.0, False, False)
     n, bias, scale = len(r), float(r.mean()), float(np.mean(r**2))
-    low, high = (scale * n / stats.chi2.ppf(p, n) for p in (1 - tail, tail))
+    low, high = (scale * n / quantile(p, n) for p in (1 - tail, tail))
     spread = r.std() if n > 1 else 1.0
-    limit = stats.t.ppf(1 - tail, max(n - 1, 1))
+    limit = stdtrit(max(n - 1, 1), 1 - tail)
     biased = bool(n > 1 and abs(bias) * np.sqrt(n) > limit * spread)
     u = white[np.isfinite(white)]
     u = u - u.mean() if u.size else u
@@ -85,7 +86,7 @@ def channel(number: int, y: Array, variance: Array, white: Array, tail: float) -
     power = float(u @ u)
     r_lag = np.array([u[k:] @ u[:-k] for k in range(1, lags + 1)]) / (power or 1.0)
     box = len(u) * (len(u) + 2) * np.sum(r_lag**2 / (len(u) - np.arange(1, lags + 1)))
-    coloured = bool(lags and box > stats.chi2.ppf(1 - 2 * tail, lags))
+    coloured = bool(lags and box > quantile(1 - 2 * tail, lags))
     one, two, three = (float(np.mean(np.abs(r) <= k)) for k in (1, 2, 3))
     within = (one, two, three)
     first = float(r_lag[0]) if lags else 0.0

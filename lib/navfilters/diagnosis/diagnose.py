@@ -10,6 +10,7 @@ import numpy as np
 from navfilters.diagnosis.channels import Channel, channel
 from navfilters.diagnosis.log_file import Log
 from navfilters.numerics import validation
+from navfilters.numerics.chi_square import quantile
 from navfilters.runs.chi_square import tail_of
 from navfilters.runs.consistency import nees
 from navfilters.types import Array
@@ -123,11 +124,9 @@ def diagnose(
     m = y.shape[1]
     tests = 2 + 2 * m + (log.error is not None)
     tail = rest / tests / 2
-    from scipy import stats
-
     total = int(dof[good].sum())
     ratio = float(nis[good].sum() / total)
-    low, high = (float(stats.chi2.ppf(p, total) / total) for p in (tail, 1 - tail))
+    low, high = (float(quantile(p, total) / total) for p in (tail, 1 - tail))
     windows = _windows(log.time[good], nis[good], dof[good], window, 2 * tail)
     beyond = windows[:, 2] > 1
     outside = beyond | (windows[:, 3] < 1)
@@ -174,15 +173,13 @@ def _whitened(y: Array, S: Array) -> tuple[Array, Array, Array, int]:
 
 def _windows(time: Array, nis: Array, dof: Array, size: int, alpha: float) -> Array:
     """Ratio of every window over the ends of its band."""
-    from scipy import stats
-
     starts = range(0, max(1, len(nis) - size // 2), size)
     rows = []
     for begin in starts:
         last = len(nis) if begin + size + size // 2 > len(nis) else begin + size
         total = dof[begin:last].sum()
         ratio = nis[begin:last].sum() / total
-        ends = [stats.chi2.ppf(p, total) / total for p in _ends(alpha / len(starts))]
+        ends = [quantile(p, total) / total for p in _ends(alpha / len(starts))]
         rows.append((time[begin], time[last - 1], ratio / ends[1], ratio / ends[0]))
     return np.array(rows)
 
@@ -193,8 +190,6 @@ def _ends(alpha: float) -> tuple[float, float]:
 
 def _errors(log: Log, tail: float) -> dict[str, Any]:
     """NEES, its mean over n, and a band for as many independent errors as the run is worth."""
-    from scipy import stats
-
     assert log.error is not None
     values = nees(log.error, log.P)
     used = values[np.isfinite(values)]
@@ -205,7 +200,7 @@ def _errors(log: Log, tail: float) -> dict[str, Any]:
     r = np.array([d[k:] @ d[: len(d) - k] for k in range(1, len(d) // 2)]) / (float(d @ d) or 1.0)
     positive = r[: np.argmax(r < 0.05)] if (r < 0.05).any() else r
     independent = max(1.0, len(used) / (1 + 2 * positive.sum()))
-    low, high = (stats.chi2.ppf(p, n * independent) / (n * independent) for p in (tail, 1 - tail))
+    low, high = (quantile(p, n * independent) / (n * independent) for p in (tail, 1 - tail))
     return {
         "nees": values,
         "nees_ratio": float(used.mean() / n),

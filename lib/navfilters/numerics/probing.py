@@ -198,11 +198,12 @@ def alike(
     own: tuple[int, ...],
     *,
     whole: bool,
+    count: int | None = None,
 ) -> None:
     """One state, several in front of the model's own batch axes, and, but for a Hessian, all."""
     options: dict[str, Any] = {"whole": whole, "finite": False}
     one = first_member(x)
-    count = 1 + sum(core) + one.size  # no other axis is as long
+    count = count or 1 + sum(core) + one.size  # no other axis is as long
     near = 1 + 2.0**-10 * np.arange(count)
     several = (near[:, None] * one).reshape(count, *(1,) * len(own), -1)
     with np.errstate(all="ignore"):

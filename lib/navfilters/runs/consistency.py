@@ -3,7 +3,7 @@
 Errors are (..., n) with their covariances (..., n, n). Of their leading axes the caller names that
 of the independent runs, ``runs_axis``, and the others are kept: 1 for a history of ``run``, of
 shape (steps + 1, runs, n), 0 for one time of it. Innovations and S may take their place.
-Runs that are not finite are left out and counted. For the host: NumPy and scipy.stats.
+Runs that are not finite are left out and counted. For the host: NumPy and scipy.special.
 """
 
 from typing import Any, NamedTuple
@@ -230,11 +230,11 @@ def coverage(
     n = runs[..., None]
     variance = np.diagonal(cov, axis1=-2, axis2=-1)
     hits = np.sum(used[..., None] & (error**2 <= k * k * variance), axis=0)
-    from scipy import stats
+    from scipy.special import betaincinv, chdtr  # see quantile
 
-    low = np.where(hits > 0, stats.beta.ppf(tail, np.maximum(hits, 1), n - hits + 1), 0.0)
-    high = np.where(hits < n, stats.beta.ppf(1 - tail, hits + 1, np.maximum(n - hits, 1)), 1.0)
-    expected = float(stats.chi2.cdf(k * k, 1))
+    low = np.where(hits > 0, betaincinv(np.maximum(hits, 1), n - hits + 1, tail), 0.0)
+    high = np.where(hits < n, betaincinv(hits + 1, np.maximum(n - hits, 1), 1 - tail), 1.0)
+    expected = float(chdtr(1, k * k))
     return Coverage(hits / n, low, high, expected, runs)
 
 

@@ -237,26 +237,36 @@ def dynamics(model: Any, prior: Gaussian) -> None:
     Q = validation.covariance("dynamics.Q", model.Q, size, definite=False)
     own = Q.shape[:-2]
 
-    def part(name: str, i: int, count: int) -> Callable[[Any], Any]:
-        def of_tuple(x: Any) -> Any:
-            found = getattr(model, name)(*((x, Q) if name == "propagate" else (x,)))
-            if not (isinstance(found, tuple) and len(found) == count):
-                needed = "(f(x), F)" if count == 2 else "(f(x), F, W)"
-                raise ValueError(f"a tuple {needed} is needed; found {type(found).__name__}")
-            return found[i]
+    def parts(name: str, count: int) -> list[Callable[[Any], Any]]:
+        seen: dict[Any, tuple[Any, ...]] = {}  # the parts are asked for at the same states
 
-        return of_tuple
+        def of_tuple(x: Any) -> tuple[Any, ...]:
+            key = x.shape, x.tobytes()
+            if key not in seen:
+                found = getattr(model, name)(*((x, Q) if name == "propagate" else (x,)))
+                if not (isinstance(found, tuple) and len(found) == count):
+                    needed = "(f(x), F)" if count == 2 else "(f(x), F, W)"
+                    raise ValueError(f"a tuple {needed} is needed; found {type(found).__name__}")
+                seen[key] = found
+            return seen[key]
+
+        def part(i: int) -> Callable[[Any], Any]:
+            return lambda x: of_tuple(x)[i]
+
+        return [part(i) for i in range(count)]
 
     state, square = mean.shape[-1:], (n, n)
     if "f" in known:
         alike("dynamics.f", model.f, mean, state, own, whole=True)
+    states = 1 + 2 * n + mean.shape[-1]  # longer than any axis of any part
     for name, count in (("transition", 2), ("propagate", 3)):
         if name in known:
             called = f"dynamics.{name}"
-            alike(f"f(x) of {called}", part(name, 0, count), mean, state, own, whole=True)
-            alike(f"F of {called}", part(name, 1, count), mean, square, own, whole=False)
-    if "propagate" in known:
-        alike("W of dynamics.propagate", part("propagate", 2, 3), mean, square, own, whole=False)
+            of_x, of_F, *of_W = parts(name, count)
+            alike(f"f(x) of {called}", of_x, mean, state, own, whole=True, count=states)
+            alike(f"F of {called}", of_F, mean, square, own, whole=False)
+            for W in of_W:
+                alike(f"W of {called}", W, mean, square, own, whole=False)
 
 
 def measured_size(model: MeasurementModel, prior: Gaussian) -> int:

@@ -12,7 +12,7 @@ try:
     from matplotlib.axes import Axes
 except ImportError as error:
     raise missing("matplotlib", "navfilters[book]", "plotting", error) from None
-from navfilters.book.plotting.styles import BOUND, STYLES, TRUTH
+from navfilters.book.plotting.styles import BOUND, STYLES, TRUTH, lay_out
 
 
 def error_axes(ax: Axes, *, log_k: bool = True) -> None:
@@ -64,7 +64,7 @@ def label_ends(ax: Axes, *, gap: float = 11.0, names: Mapping[str, str] | None =
     """
     figure = ax.get_figure(root=True)
     assert figure is not None
-    figure.draw_without_rendering()
+    lay_out(figure)
     lines = [
         line
         for line in ax.get_lines()

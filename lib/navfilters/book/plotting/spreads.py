@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtrc
 
 from navfilters.book.plotting.curves import panels
 from navfilters.book.plotting.styles import BOUND, EKF, MEASUREMENT, SECOND_ORDER, TRUTH, UKF
@@ -97,6 +96,8 @@ def nees_tails(
     -------
     Figure
     """
+    from scipy.special import chdtrc  # which most figures need not import
+
     figure, (ax,) = panels(1, 1, figsize=(7.0, 3.8))
     grid = np.linspace(0, 60, 200)
     right = chdtrc(dof, grid)

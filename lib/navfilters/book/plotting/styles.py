@@ -108,3 +108,33 @@ def use_style() -> None:
             "legend.frameon": False,
         }
     )
+    if "inline" in plt.get_backend():
+        _draw_to_show()
+
+
+def _draw_to_show() -> None:
+    """Let a notebook draw a cell's figures when it shows them, and pyplot not once before."""
+    from IPython import get_ipython
+
+    shell = get_ipython()
+    if shell is None:  # a script that a notebook started has its backend
+        return
+    plt.switch_backend(plt.get_backend())  # else the first figure does, and connects again
+    plt.uninstall_repl_displayhook()
+    hooks = shell.events.callbacks["post_execute"]
+    if _lay_all_out not in hooks:
+        hooks.insert(0, _lay_all_out)  # registered, it would come when they have been shown
+
+
+def _lay_all_out() -> None:
+    """What figures keep of a drawing: a constrained layout is still better the second time."""
+    for number in plt.get_fignums():
+        lay_out(plt.figure(number))
+
+
+def lay_out(figure: Any) -> None:
+    """Put a figure's axes where a drawing would, which costs half of it if there is a layout."""
+    if engine := figure.get_layout_engine():
+        engine.execute(figure)
+    else:
+        figure.draw_without_rendering()

@@ -64,8 +64,9 @@ def point_echo(
     def heard(pulses: slice) -> None:
         into = delay + 2 * (window.near_range - distance[pulses, None]) / LIGHT
         phase = np.pi * radar.chirp_rate * (into - radar.pulse_length / 2) ** 2
-        inside = (into >= 0) & (into < radar.pulse_length)
-        echo[pulses] = np.where(inside, _turned(phase), 0) * carrier[pulses, None]
+        chirp = _turned(phase)
+        chirp[(into < 0) | (into >= radar.pulse_length)] = 0
+        np.multiply(chirp, carrier[pulses, None], out=echo[pulses])
 
     in_threads(heard, blocks(window.pulses, max(CACHED // len(delay), 1)))
     return echo

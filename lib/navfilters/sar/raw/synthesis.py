@@ -120,12 +120,15 @@ def synthesize(
 
     def add_up(rows: slice) -> None:
         total = np.zeros((rows.stop - rows.start, m), np.complex64)
+        H = np.empty_like(total)
         for b, transfer in enumerate(transfers):
             part = ground[b].spectra(rows, m) if ground else np.zeros_like(total)
             if bright:
                 bright[b].add(rows, part)
             for columns, spectra, weights in transfer:
-                total[:, columns] += part[:, columns] * (spectra[rows] @ weights)
+                np.matmul(spectra[rows], weights, out=H[:, columns])
+            part *= H
+            total += part
         total *= pulse
         in_range[rows] = fft.ifft(total, axis=1, overwrite_x=True)[:, : window.ranges]
 
