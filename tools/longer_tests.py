@@ -44,8 +44,8 @@ def pytest_runtest_protocol(item: Any) -> Iterator[None]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: Any, call: Any) -> Iterator[None]:
-    """Told with the last report, which workers send to their parent."""
-    if call.when == "teardown":
+    """Told with the last report, which workers send to their parent; what is marked is known."""
+    if call.when == "teardown" and not item.get_closest_marker("slow"):
         made_now = sum(_shared.values()) - item.known
         fixtures = sum(_shared.get(name, 0.0) for name in item.fixturenames)
         took = _used() - item.begun - made_now + fixtures
