@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from naive import covariances
 from scipy.stats import chi2
+from untraced import untraced
 
 from navfilters import Filter, Gaussian, SigmaPoints, linearized, run, second_order, unscented
 from navfilters.estimators import (
@@ -161,6 +162,7 @@ def test_the_grid_covers_every_variant():
 
 @pytest.mark.parametrize("moments", MOMENTS)
 @pytest.mark.parametrize(("rule", "variant"), list(product(RULES, VARIANTS)))
+@untraced()
 def test_on_a_linear_model_every_combination_is_its_kalman_filter(rule, variant, moments):
     """Without dynamics against ``linear_limit`` too; with dynamics against the textbook's step."""
     prior, z, model, walk = problem(Retracted)
@@ -181,6 +183,7 @@ def test_on_a_linear_model_every_combination_is_its_kalman_filter(rule, variant,
 
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("moments", MOMENTS)
+@untraced()
 def test_twenty_steps_are_the_textbooks(moments, variant):
     """A Kalman filter of the declared P and R, again and again; no rule, and one that is idle."""
     prior, _, model, walk = problem(Retracted)
