@@ -47,7 +47,7 @@ locked = $(call install,$(1)) --require-hashes -r $(2)
 ours = $(call install,$(1)) --no-deps --no-build-isolation -e .
 
 .DEFAULT_GOAL := help
-.PHONY: help book test unit coverage lint notebooks nbval elsewhere spread pages screens pdf dist serve bench fuzz faults shuffled mutants campaign lock clean
+.PHONY: help book test unit longer coverage lint notebooks nbval elsewhere spread pages screens pdf dist serve bench fuzz faults shuffled mutants campaign lock clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1  /p' $(MAKEFILE_LIST) | awk '{printf "  make %-10s", $$1; $$1 = ""; print}'
@@ -65,8 +65,11 @@ $(BUILT): $(SOURCES) $(VENV)/.book
 
 test: lint coverage nbval elsewhere pages  ## everything: lint, types, unit tests, notebooks, rendered pages
 
-unit: $(VENV)/.test  ## unit and property tests alone, without the slow ones, in about three minutes
-	$(BIN)/pytest tests --ignore tests/book -n 2 --dist worksteal -m "not slow"
+unit: $(VENV)/.test  ## most unit and property tests of every subject: those that take a fifth of a second at most
+	$(BIN)/pytest tests --ignore tests/book -n 2 --dist worksteal --quick
+
+longer: $(VENV)/.test  ## measure which tests take longer, and are left to make coverage
+	PYTHONPATH="$(CURDIR)/tools" $(BIN)/pytest tests --ignore tests/book -n 2 --dist worksteal -m "not slow" -p longer_tests
 
 coverage: $(VENV)/.test  ## all unit tests, with branch coverage
 	$(BIN)/pytest tests --ignore tests/book -n 2 --dist worksteal --cov --cov-report=term
@@ -127,7 +130,7 @@ faults: $(VENV)/.test  ## full disks, damaged checkpoints, two at once; runs kil
 	nice $(BIN)/python tools/kills.py
 	nice $(BIN)/python tools/cluster_faults.py
 
-shuffled: $(VENV)/.test  ## the quick unit tests in a random order, which is told and can be repeated
+shuffled: $(VENV)/.test  ## the unit tests, but for slow ones, in a random order, which is told and can be repeated
 	PYTHONPATH="$(CURDIR)/tools" $(BIN)/pytest tests --ignore tests/book -n 2 -m "not slow" -p shuffled
 
 mutants: $(VENV)/.test  ## small faults put into the library one by one: how many do the unit tests see?

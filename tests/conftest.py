@@ -1,4 +1,7 @@
-"""One deterministic hypothesis profile, so that a failure is everybody's; JAX if it is there."""
+"""One deterministic hypothesis profile, so that a failure is everybody's; JAX if it is there.
+
+``--quick`` leaves out what is marked slow, and the functions that ``longer.txt`` names.
+"""
 
 import importlib.util
 import os
@@ -26,6 +29,14 @@ WITH_JAX = [
     if re.search(r"^import jax$", path.read_text(encoding="utf-8"), re.M)
 ]
 collect_ignore = [] if HAS_JAX else WITH_JAX
+LONGER = {
+    f"tests/{name}"
+    for name in Path(__file__).with_name("longer.txt").read_text(encoding="utf-8").splitlines()
+}
+
+
+def pytest_addoption(parser):
+    parser.addoption("--quick", action="store_true", help="without the tests that take long")
 
 
 def pytest_report_header():
@@ -34,7 +45,14 @@ def pytest_report_header():
     return None
 
 
-def pytest_collection_modifyitems(items):
+def takes_long(item):
+    return item.get_closest_marker("slow") or item.nodeid.partition("[")[0] in LONGER
+
+
+def pytest_collection_modifyitems(config, items):
+    if config.getoption("--quick"):
+        config.hook.pytest_deselected(items=[item for item in items if takes_long(item)])
+        items[:] = [item for item in items if not takes_long(item)]
     for item in items:
         engine = item.callspec.params.get("engine") if hasattr(item, "callspec") else None
         if engine == "jax" and not HAS_JAX:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from logs import kalman_log
+from logs import kalman_log, kalman_logs
 from numpy.testing import assert_allclose
 from scipy import stats
 
@@ -15,7 +15,7 @@ from navfilters.runs import nis
 
 def test_right_filters_pass_as_often_as_is_said():
     """Of 120 right filters with gaps 6 may fail; 14 or more would be an accident of one in 500."""
-    failed = sum(not diagnose(kalman_log(seed, 150, gaps=0.2)).consistent for seed in range(120))
+    failed = sum(not diagnose(log).consistent for log in kalman_logs(range(120), 150, gaps=0.2))
     assert failed <= 14
 
 

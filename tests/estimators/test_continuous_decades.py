@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import RK45
+from untraced import untraced
 
 from navfilters import Gaussian
 from navfilters.estimators.continuous import ContinuousSystem, extended_kalman_bucy
@@ -32,6 +33,7 @@ def scalar_riccati(a, q, r, p, t):
 @pytest.mark.parametrize("r", [1e-6, 1e-2])
 @pytest.mark.parametrize(("a", "q"), [(0.0, 0.0), (-1.0, 1e-8), (0.5, 1.0)])
 @pytest.mark.parametrize("start", [0.0, 0.5])
+@untraced()
 def test_a_variance_over_many_decades(a, q, r, p, start):
     """Digits of the variance that is asked for, not of the prior's, from a microsecond on.
 
@@ -60,6 +62,7 @@ def test_every_integrator_follows(method):
 
 @pytest.mark.parametrize("vague", [1e3, 1e6, 1e9, 1e12])
 @pytest.mark.parametrize("r", [1e-6, 1e-2])
+@untraced()
 def test_position_and_velocity_from_a_vague_prior(vague, r):
     """P^-1 = F^-T (P_0^-1 + W) F^-1: what the measurements of the position add up to."""
     system = ContinuousSystem(

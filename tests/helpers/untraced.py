@@ -1,4 +1,4 @@
-"""Second computations without coverage's tracer, which would take twice as long as they do."""
+"""Without coverage's tracer, which takes twice as long as what it follows."""
 
 import sys
 from collections.abc import Iterator
@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def untraced() -> Iterator[None]:
-    """For what calls oracles alone, whose lines are not counted."""
+    """For oracles, whose lines are not counted, and for lines that many other tests run."""
     tracer = sys.gettrace()
     sys.settrace(None)
     try:

@@ -60,6 +60,7 @@ def assert_agrees(got, entries, setup, steps=STEPS):
 @every_setup
 @every_form
 @pytest.mark.parametrize("name", ["EKF", "B-EKF 1", "B-EKF 2", "B-EKF 3", "B-EKF 4"])
+@untraced()
 def test_ekf_family(name, form, setup):
     got = run(replace(FILTERS[name], form=form), setup.prior, setup.z, setup.model)
     assert_agrees(got, exact(name, setup), setup)
@@ -75,6 +76,7 @@ def test_the_bump_of_eq_14(bump):
 @every_setup
 @pytest.mark.parametrize("points", POINTS.values(), ids=POINTS)
 @pytest.mark.parametrize("name", ["UKF", "B-UKF", "UKFz"])
+@untraced()
 def test_ukf_family(name, setup, points):
     estimator = FILTERS[name].having(points=SigmaPoints(**points))
     got = run(estimator, setup.prior, setup.z, setup.model)
@@ -116,6 +118,7 @@ def ensemble(name, setup):
 
 @every_setup
 @pytest.mark.parametrize("name", ["mtSOF", "B-mtSOF"])
+@untraced()
 def test_second_order_filters(name, setup):
     """To 1e-6 while P is definite; after that, inside what the last bits of the inputs allow.
 
@@ -146,6 +149,7 @@ def test_second_order_filters(name, setup):
 
 
 @every_form
+@untraced()
 def test_where_the_setups_lose_definiteness(form):
     """The claim of sections V and VI, and that the other two set-ups test the other cases."""
     filters = {name: replace(FILTERS[name], form=form) for name in ("mtSOF", "B-mtSOF")}

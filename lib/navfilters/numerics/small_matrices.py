@@ -6,6 +6,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from navfilters.numerics.in_floats import POINTS, SMALL, in_floats
+from navfilters.numerics.loops import is_jax, repeat
 from navfilters.types import Array
 
 WRITTEN_OUT = SMALL
@@ -208,42 +209,49 @@ def _rounding(n: int) -> float:
 
 
 def _deferred_cholesky(A: Array) -> tuple[Array, Array, Array]:
-    """S, T and whether they are those of a singular, semidefinite member."""
-    xp, n = A.__array_namespace__(), A.shape[-1]
-    zero = xp.zeros_like(A[..., 0, 0])
-    S = [[zero] * n for _ in range(n)]
-    live: list[Array] = []
+    """S, T and whether they are those of a singular, semidefinite member.
 
-    def rest(i: int, j: int, done: int) -> Array:
-        return A[..., max(i, j), min(i, j)] - sum(S[i][k] * S[j][k] for k in range(done))
+    Column by column, in loops that JAX compiles in a tenth of the time of elements written out.
+    """
+    xp, n, batch = A.__array_namespace__(), A.shape[-1], A.shape[:-2]
+    front, back = (len(batch), len(batch) + 1, *range(len(batch))), (*range(2, A.ndim), 0, 1)
+    lower = xp.where(xp.tril(xp.ones((n, n), dtype=bool)), A, A.mT)
+    flat = xp.reshape(xp.permute_dims(lower, front), (-1,))  # the members innermost in memory
+    a = xp.reshape(flat, (n, n, *batch))
+    number, zero = xp.arange(n).reshape(n, *(1,) * len(batch)), xp.zeros_like(a[0])
 
-    for j in range(n):
-        pivot = rest(j, j, j)
-        live.append(pivot > _rounding(n) * A[..., j, j])
-        S[j][j] = xp.sqrt(xp.where(live[j], pivot, 1.0))
-        for i in range(n):
-            if i != j:
-                follows = live[j] if i > j else live[j] & ~live[i]
-                S[i][j] = xp.where(follows, rest(i, j, j) / S[j][j], 0.0)
-        S[j][j] = xp.where(live[j], S[j][j], 0.0)
-    T = [[xp.where(live[i], 1.0, 0.0) if i == j else zero for j in range(n)] for i in range(n)]
-    for j in reversed(range(n)):
-        pivot = xp.where(live[j], S[j][j], 1.0)
-        for i in range(n):
-            if i != j:
-                of_later = sum(T[i][k] * S[k][j] for k in range(j + 1, n))
-                T[i][j] = xp.where(live[j] & ~live[i], (S[i][j] - of_later) / pivot, 0.0)
-    deviation = [xp.sqrt(xp.where(A[..., i, i] > 0, A[..., i, i], 0.0)) for i in range(n)]
-    reach = [sum(xp.abs(T[i][k]) * deviation[k] for k in range(n)) for i in range(n)]
-    singular = ~xp.all(xp.stack(live), axis=0)
-    for i in range(n):
-        for j in range(i + 1):
-            size = xp.where(reach[i] > deviation[i], reach[i], deviation[i]) * xp.where(
-                reach[j] > deviation[j], reach[j], deviation[j]
-            )
-            small = xp.abs(rest(i, j, n)) <= 8 * _rounding(n) * size
-            singular = singular & (live[i] | live[j] | small)
-    return matrix(S), matrix(T), singular
+    def put(X: Array, j: Array, diagonal: Array, others: Array) -> Array:
+        column = xp.where(number == j, diagonal, others)
+        if is_jax(xp):
+            return X.at[:, j].set(column)
+        X[:, j] = column
+        return X
+
+    def factor(j: Array, carry: tuple[Array, Array]) -> tuple[Array, Array]:
+        S, live = carry
+        rest = a[:, j] - repeat(lambda k, so_far: so_far + S[:, k] * S[j, k], zero, n, xp)
+        alive = rest[j] > _rounding(n) * a[j, j]
+        root = xp.sqrt(xp.where(alive, rest[j], 1.0))
+        others = xp.where(alive & ~live, rest / root, 0.0)  # later rows, and those that wait
+        S = put(S, j, xp.where(alive, root, 0.0), others)
+        return S, xp.where(number == j, alive, live)
+
+    def follow(last: Array, T: Array) -> Array:
+        j = n - 1 - last
+        of_later = repeat(lambda k, so_far: so_far + T[:, k] * S[k, j], zero, n, xp)
+        others = (S[:, j] - of_later) / xp.where(live[j], S[j, j], 1.0)
+        return put(T, j, xp.where(live[j], 1.0, 0.0), xp.where(live[j] & ~live, others, 0.0))
+
+    S, live = repeat(factor, (xp.zeros_like(a), zero > 0), n, xp)
+    T = repeat(follow, xp.zeros_like(a), n, xp)
+    variance = xp.stack([a[j, j] for j in range(n)])
+    deviation = xp.sqrt(xp.where(variance > 0, variance, 0.0))
+    reach = repeat(lambda k, so_far: so_far + xp.abs(T[:, k]) * deviation[k], zero, n, xp)
+    size = xp.where(reach > deviation, reach, deviation)
+    whole = repeat(lambda k, so_far: so_far + S[:, None, k] * S[:, k], xp.zeros_like(a), n, xp)
+    small = xp.abs(a - whole) <= 8 * _rounding(n) * (size[:, None] * size)
+    singular = xp.all(live[:, None] | live | small, axis=(0, 1)) & ~xp.all(live, axis=0)
+    return xp.permute_dims(S, back), xp.permute_dims(T, back), singular
 
 
 def right_divide(B: Array, A: Array) -> Array:

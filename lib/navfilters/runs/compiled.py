@@ -137,14 +137,21 @@ def _scan(job: Job, arrays: list[jax.Array]) -> Kept:
         """Without what our own filters only tell: to carry it costs a tenth of a step."""
         return state._replace(innovation=None, S=None) if ours else state
 
-    def alone(state: Any, rows: Any, k: int) -> tuple[Any, Any]:
-        state, row = march.step(state, k)
-        return state, _below(rows, jax.tree.map(lambda a: a[None], row))
+    def below(rows: Any, row: Any) -> Any:
+        return _below(rows, jax.tree.map(lambda a: a[None], row))
 
-    after = jax.eval_shape(lambda s: march.step(s, 0)[0], state) if job.steps else state
+    def z(k: int) -> jax.Array:
+        return march.z[k] if job.z_per_step else march.z
+
+    if job.steps == 1:
+        state, row = march.step(state, 0)
+        return Kept(state, below(rows, row))
+    advance = jax.jit(march.advance)  # traced once for its shapes, the scan and the last step
+    after = jax.eval_shape(advance, state, np.int64(0), z(0))[0] if job.steps else state
     if not _alike(carried(state), carried(after)):
         # A filter may begin with None where it will have an array: its first step is another's.
-        (state, rows), first = alone(state, rows, 0), 1
+        state, row = march.step(state, 0)
+        rows, first = below(rows, row), 1
     last -= ours and last > first
     if last > first:
         numbers = jnp.arange(first, last)
@@ -152,13 +159,14 @@ def _scan(job: Job, arrays: list[jax.Array]) -> Kept:
 
         def step(state: Any, now: Any) -> tuple[Any, Any]:
             k, z = now
-            state, row = march.advance(state, k, z if job.z_per_step else march.z)
+            state, row = advance(state, k, z if job.z_per_step else march.z)
             return carried(state), row
 
         state, more = jax.lax.scan(step, carried(state), series)
         rows = _below(rows, more)
     if job.steps > last:
-        state, rows = alone(state, rows, last)
+        state, row = advance(state, np.int64(last), z(last))
+        rows = below(rows, row)
     return Kept(state, rows)
 
 
