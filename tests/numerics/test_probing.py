@@ -134,6 +134,18 @@ def test_probe_looks_at_the_axes_in_front():
             probe("f", lambda x: x, (np.ones((3, 2)),), (2,), batch, least=least)
 
 
+@pytest.mark.parametrize("corner", [0, -1])
+def test_the_first_and_the_last_member_are_compared(corner):
+    def f(x):
+        y = x.copy()
+        y[corner] += x.ndim - 1  # in a batch only
+        return y
+
+    x = np.linspace(1.0, 2.0, 6).reshape(3, 2)
+    with pytest.raises(ValueError, match="f must give a state in a batch what it gives it alone"):
+        members("f", f, (x,), 1, (2,), (3,), whole=True)
+
+
 def test_members_are_compared_to_a_part_in_a_million():
     x = np.linspace(1.0, 2.0, 6).reshape(3, 2)
     near = members("f", lambda x: x * (1 + 1e-9 * x.ndim), (x,), 1, (2,), (3,), whole=True)
