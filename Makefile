@@ -65,7 +65,7 @@ $(BUILT): $(SOURCES) $(VENV)/.book
 
 test: lint coverage nbval elsewhere pages  ## everything: lint, types, unit tests, notebooks, rendered pages
 
-unit: $(VENV)/.test  ## most unit and property tests of every subject: those that take a fifth of a second at most
+unit: $(VENV)/.test  ## most unit and property tests of every subject: those that take a tenth of a second at most
 	$(BIN)/pytest tests --ignore tests/book -n 2 --dist worksteal --quick
 
 longer: $(VENV)/.test  ## measure which tests take longer, and are left to make coverage
@@ -130,8 +130,8 @@ faults: $(VENV)/.test  ## full disks, damaged checkpoints, two at once; runs kil
 	nice $(BIN)/python tools/kills.py
 	nice $(BIN)/python tools/cluster_faults.py
 
-shuffled: $(VENV)/.test  ## the unit tests, but for slow ones, in a random order, which is told and can be repeated
-	PYTHONPATH="$(CURDIR)/tools" $(BIN)/pytest tests --ignore tests/book -n 2 -m "not slow" -p shuffled
+shuffled: $(VENV)/.test  ## the tests of make unit in a random order, which is told and can be repeated
+	PYTHONPATH="$(CURDIR)/tools" $(BIN)/pytest tests --ignore tests/book -n 2 --quick -p shuffled
 
 mutants: $(VENV)/.test  ## small faults put into the library one by one: how many do the unit tests see?
 	nice $(BIN)/python tools/mutants.py

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-LIMIT = 0.2
+LIMIT = 0.1
 """Seconds of processors: a test's own, and those of processes that it waited for."""
 
 STORED = Path(__file__).resolve().parent.parent / "tests" / "longer.txt"
