@@ -65,7 +65,7 @@ $(BUILT): $(SOURCES) $(VENV)/.book
 
 test: lint coverage nbval elsewhere pages  ## everything: lint, types, unit tests, notebooks, rendered pages
 
-unit: $(VENV)/.test  ## most unit and property tests of every subject: those that take a tenth of a second at most
+unit: $(VENV)/.test  ## the unit and property tests that take a tenth of a second at most: five of six
 	$(BIN)/pytest tests --ignore tests/book -n 2 --dist worksteal --quick
 
 longer: $(VENV)/.test  ## measure which tests take longer, and are left to make coverage
@@ -85,7 +85,7 @@ lint: $(VENV)/.test  ## ruff over code and notebooks, mypy and the layers of imp
 $(BUILT) elsewhere: export OPENBLAS_THREAD_TIMEOUT := 4
 nbval: $(VENV)/.test  ## run every notebook and compare with its stored outputs
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH="$(CURDIR)/tools" $(BIN)/pytest book --nbval --nbval-current-env -n 2 --dist loadscope \
-		--no-loadscope-reorder --nbval-kernel-startup-timeout 20 -p no:cacheprovider -p kernels -p longest_first -p keep_executed
+		--no-loadscope-reorder -p no:cacheprovider -p kernels -p longest_first -p keep_executed
 
 elsewhere: $(VENV)/.test  ## the same without AVX-512, and with another BLAS kernel on one thread
 	$(BIN)/python tools/nbval_elsewhere.py

@@ -11,6 +11,8 @@ import nbval.kernel
 import pytest
 
 STARTS = 3
+PATIENCE = 20.0
+"""Seconds for a start, in the place of nbval's 60."""
 
 
 def again(start: Callable[..., Any]) -> Callable[..., Any]:
@@ -29,4 +31,5 @@ def again(start: Callable[..., Any]) -> Callable[..., Any]:
 
 def pytest_configure(config: pytest.Config) -> None:
     """In every worker."""
+    config.option.nbval_kernel_startup_timeout = PATIENCE
     nbval.kernel.start_new_kernel = again(nbval.kernel.start_new_kernel)

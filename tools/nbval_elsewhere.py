@@ -18,8 +18,6 @@ PYTEST = [
     "--dist",
     "loadscope",
     "--no-loadscope-reorder",
-    "--nbval-kernel-startup-timeout",
-    "20",
     "-p",
     "kernels",
     "-p",
