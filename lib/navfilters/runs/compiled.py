@@ -19,7 +19,7 @@ try:
 except ImportError as error:
     raise missing("jax", "navfilters[jax]", 'engine="jax"', error) from None
 
-BLOCK = 512
+BLOCK = 128
 """Members that a processor's core takes through all steps at once: their arrays stay in its cache,
 and since every block is the same program, a member's result does not depend on the chunk's size."""
 

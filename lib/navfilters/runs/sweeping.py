@@ -142,7 +142,7 @@ def sweep(
     Notes
     -----
     A configuration's result depends neither on the others, nor on their order, nor on the workers;
-    nor on the chunk, unless it is smaller than 512 under JAX, or than 2 under NumPy where products
+    nor on the chunk, unless it is smaller than 128 under JAX, or than 2 under NumPy where products
     are left to BLAS (in a model, or with more than two states or measurements): then the last bits
     of each step may differ.
 
