@@ -102,6 +102,22 @@ def test_a_parquet_column_of_no_text_is_refused(tmp_path):
         read_log(path)
 
 
+@pytest.mark.parametrize("column", ["note", "S_12"])
+def test_text_in_parquet_that_is_no_text(tmp_path, column):
+    """What a log does not use is not looked at; what it uses is refused."""
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    table = {"time": [0.0], "innovation_1": [1.0], "S_11": [2], column: ["remark"]}
+    path = tmp_path / "log.parquet"
+    parquet.write_table(pyarrow.table(table), path, compression="none", write_statistics=False)
+    path.write_bytes(path.read_bytes().replace(b"remark", b"re\xedark"))
+    if column == "note":
+        assert read_log(path).ignored == ("note",)
+    else:
+        with pytest.raises(LogError, match=r"log\.parquet: a Parquet file .*Invalid UTF8"):
+            read_log(path)
+
+
 def test_a_parquet_column_of_dates_is_refused(tmp_path):
     pyarrow = pytest.importorskip("pyarrow")
     parquet = pytest.importorskip("pyarrow.parquet")
