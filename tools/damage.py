@@ -214,7 +214,7 @@ def column(data: bytearray, draw: random.Random, other: bytes) -> None:
     whole = io.BytesIO()
     try:
         parquet.write_table(pyarrow.table(columns), whole)
-    except (pyarrow.ArrowException, OverflowError):  # values of several kinds, or too large
+    except (pyarrow.ArrowException, OverflowError, ValueError):  # of several kinds, or too large
         return
     data[:] = whole.getvalue()
 
