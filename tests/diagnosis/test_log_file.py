@@ -127,6 +127,17 @@ def test_a_parquet_column_of_dates_is_refused(tmp_path):
         read_log(tmp_path / "log.parquet")
 
 
+def test_a_parquet_column_that_numpy_cannot_hold_is_refused(tmp_path):
+    """Times of day in nanoseconds, which Arrow gives as Python's, of microseconds."""
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    times = pyarrow.array([1], pyarrow.time64("ns"))
+    table = {"time": times, "innovation_1": [1.0], "S_11": [2]}
+    parquet.write_table(pyarrow.table(table), tmp_path / "log.parquet")
+    with pytest.raises(LogError, match=r"log\.parquet: .*nanoseconds"):
+        read_log(tmp_path / "log.parquet")
+
+
 def test_parquet_without_pyarrow_says_so(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     monkeypatch.delitem(sys.modules, "pyarrow.parquet", raising=False)

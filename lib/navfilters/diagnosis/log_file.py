@@ -225,13 +225,13 @@ def _parquet(path: Path) -> dict[str, np.ndarray]:
         names = dataset.schema.names
         table = dataset.read([name for name in names if _used(name)])
         table.validate(full=True)  # Arrow's readers may return what is not valid, and say so
+        arrays = {name: table[name].to_numpy() for name in table.column_names}
     except FileNotFoundError:
         raise
     except Exception as error:  # pyarrow raises nearly anything
         raise LogError(f"{path}: a Parquet file is needed; found: {error}") from None
     columns = {name: np.empty(0) for name in names}
-    for name in table.column_names:
-        values = table[name].to_numpy()
+    for name, values in arrays.items():
         if values.dtype.kind not in "iuf":
             raise LogError(f"{path}: {name} must be numbers; found {table[name].type}")
         columns[name] = values.astype(float)
