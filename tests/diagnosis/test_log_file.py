@@ -102,12 +102,39 @@ def test_a_parquet_column_of_no_text_is_refused(tmp_path):
         read_log(path)
 
 
+@pytest.mark.parametrize("column", ["note", "S_12"])
+def test_text_in_parquet_that_is_no_text(tmp_path, column):
+    """What a log does not use is not looked at; what it uses is refused."""
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    table = {"time": [0.0], "innovation_1": [1.0], "S_11": [2], column: ["remark"]}
+    path = tmp_path / "log.parquet"
+    parquet.write_table(pyarrow.table(table), path, compression="none", write_statistics=False)
+    path.write_bytes(path.read_bytes().replace(b"remark", b"re\xedark"))
+    if column == "note":
+        assert read_log(path).ignored == ("note",)
+    else:
+        with pytest.raises(LogError, match=r"log\.parquet: a Parquet file .*Invalid UTF8"):
+            read_log(path)
+
+
 def test_a_parquet_column_of_dates_is_refused(tmp_path):
     pyarrow = pytest.importorskip("pyarrow")
     parquet = pytest.importorskip("pyarrow.parquet")
     table = {"time": ["2010-11-02"], "innovation_1": [1.0], "S_11": [2]}
     parquet.write_table(pyarrow.table(table), tmp_path / "log.parquet")
     with pytest.raises(LogError, match="time must be numbers; found string"):
+        read_log(tmp_path / "log.parquet")
+
+
+def test_a_parquet_column_that_numpy_cannot_hold_is_refused(tmp_path):
+    """Times of day in nanoseconds, which Arrow gives as Python's, of microseconds."""
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    times = pyarrow.array([1], pyarrow.time64("ns"))
+    table = {"time": times, "innovation_1": [1.0], "S_11": [2]}
+    parquet.write_table(pyarrow.table(table), tmp_path / "log.parquet")
+    with pytest.raises(LogError, match=r"log\.parquet: .*nanoseconds"):
         read_log(tmp_path / "log.parquet")
 
 

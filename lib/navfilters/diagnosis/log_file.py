@@ -221,19 +221,20 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
 def _parquet(path: Path) -> dict[str, np.ndarray]:
     parquet = needed("pyarrow.parquet", "pyarrow", "a log in Parquet")
     try:
-        table = parquet.read_table(path)
-        names = table.column_names
+        dataset = parquet.ParquetDataset(path)
+        names = dataset.schema.names
+        table = dataset.read([name for name in names if _used(name)])
+        table.validate(full=True)  # Arrow's readers may return what is not valid, and say so
+        arrays = {name: table[name].to_numpy() for name in table.column_names}
     except FileNotFoundError:
         raise
     except Exception as error:  # pyarrow raises nearly anything
         raise LogError(f"{path}: a Parquet file is needed; found: {error}") from None
-    columns = {}
-    for name in names:
-        values = table[name].to_numpy()
-        number = values.dtype.kind in "iuf"
-        if _used(name) and not number:
+    columns = {name: np.empty(0) for name in names}
+    for name, values in arrays.items():
+        if values.dtype.kind not in "iuf":
             raise LogError(f"{path}: {name} must be numbers; found {table[name].type}")
-        columns[name] = values.astype(float) if number else np.empty(0)
+        columns[name] = values.astype(float)
     return columns
 
 
