@@ -72,6 +72,11 @@ def as_filter(estimator: Any) -> Any:
         if hasattr(estimator, "init") and hasattr(estimator, "step"):
             return estimator
         if isinstance(estimator, partial) and isinstance(estimator.func, Filter):
+            if estimator.args:
+                raise TypeError(
+                    "estimator must be a partial of a filter with options by name, as "
+                    f"points=SigmaPoints(); found {estimator.args[0]!r} without one"
+                )
             return estimator.func.having(**estimator.keywords)
         if callable(estimator):
             _takes_three(estimator)
