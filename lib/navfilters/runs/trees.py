@@ -128,7 +128,9 @@ class Leaf(NamedTuple):
         if self.axis is None:
             return self.array
         shape, last = self.array.shape, self.lead + len(self.batch)
-        every = np.broadcast_to(self.array, (*shape[: self.lead], *batch, *shape[last:]))
+        missing = (1,) * (len(batch) - len(self.batch))  # behind the series, not in front of it
+        whole = self.array.reshape(*shape[: self.lead], *missing, *shape[self.lead :])
+        every = np.broadcast_to(whole, (*shape[: self.lead], *batch, *shape[last:]))
         lead: tuple[Any, ...] = (slice(None),) * self.lead
         return np.ascontiguousarray(every[lead + index])
 
