@@ -7,7 +7,6 @@ one where ``gain`` is another number.
 import dis
 import hashlib
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from numbers import Real
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
@@ -31,11 +30,10 @@ OF_TUPLES = ("_asdict", "_field_defaults", "_fields", "_make", "_replace")
 Simple = bool | Real | complex | str | bytes | np.generic | None
 
 
-@dataclass(eq=False)
 class Surroundings:
     """What was found around the code in a tree.
 
-    Parameters
+    Attributes
     ----------
     read : list of tuple
         What is read and is a number, a text or an array: its name and its value or a hash of it.
@@ -44,9 +42,10 @@ class Surroundings:
         Whether that is all: nothing can change unseen.
     """
 
-    read: list[tuple[Any, ...]] = field(default_factory=list)
-    whole: bool = True
-    _seen: set[Any] = field(default_factory=set)
+    def __init__(self) -> None:
+        self.read: list[tuple[Any, ...]] = []
+        self.whole = True
+        self._seen: set[Any] = set()
 
     @classmethod
     def of(cls, tree: Tree) -> "Surroundings":
