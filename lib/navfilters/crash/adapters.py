@@ -46,7 +46,10 @@ class Adapted:
     def step(
         self, state: FilterState, z: Array, sensor: Any, dynamics: Any = None, k: Array = 0
     ) -> FilterState:
-        """A prediction, where there are dynamics, and an update, of every member."""
+        """A prediction, where there are dynamics, and an update, of every member.
+
+        ValueError for models with batch axes, which one state at a time cannot have.
+        """
         z, sensor = model_parts.seen(np.asarray(z, float), sensor, k)
         mean, cov = state.estimate
         m, n = z.shape[-1], mean.shape[-1]
@@ -55,6 +58,12 @@ class Adapted:
         covs = np.broadcast_to(cov, (*batch, n, n)).reshape(-1, n, n)
         seen = np.broadcast_to(z, (*batch, m)).reshape(-1, m)
         moved = None if dynamics is None else model_parts.at(dynamics, k)
+        for name, model, noise in (("model", sensor, "R"), ("dynamics", moved, "Q")):
+            if np.ndim(getattr(model, noise, 0)) > 2:
+                raise ValueError(
+                    f"{name} must have no batch axes for a filter of one state at a time; found "
+                    f"{name}.{noise} of shape {np.shape(getattr(model, noise))}"
+                )
         with warnings.catch_warnings():  # one per member and step would bury the report
             warnings.simplefilter("ignore")
             new = [self._one(*each, sensor, moved) for each in zip(means, covs, seen, strict=True)]
