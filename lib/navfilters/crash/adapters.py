@@ -77,13 +77,20 @@ class Adapted:
         """Mean, covariance, innovation and S of a member, the last two NaN where not measured."""
         x, P, kept = x.copy(), P.copy(), np.flatnonzero(~np.isnan(z))
         y, S = np.full(z.shape, np.nan), np.full(z.shape * 2, np.nan)
+        shapes = x.shape, P.shape
         if dynamics is not None:
             x, P = self.predict(x, P, _additive(dynamics, x, P))
         if kept.size:
             x, P, *told = self.update(x, P, z, _measuring(sensor, np.reshape(x, -1)))
             if self.innovations:
                 y[kept], S[np.ix_(kept, kept)] = np.reshape(told[0], -1), told[1]
-        return np.asarray(x, float).reshape(-1), np.asarray(P, float), y, S
+        found = np.asarray(x, float).reshape(-1), np.asarray(P, float)
+        if (found[0].shape, found[1].shape) != shapes:
+            raise ValueError(
+                f"predict and update must return mean and cov of shapes {shapes[0]} and "
+                f"{shapes[1]}; found {found[0].shape} and {found[1].shape}"
+            )
+        return *found, y, S
 
 
 class _With:
