@@ -37,6 +37,17 @@ def test_either_triangle_long_names_and_other_columns(tmp_path):
     assert log.ignored == ("note",)
 
 
+def test_both_triangles_may_differ_by_rounding_and_have_empty_cells(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "time,innovation_1,innovation_2,S_11,S_12,S_21,S_22\n"
+        "0,1,2,3,0.5,0.50001,4\n1,1,2,3,,0.5,4\n2,1,2,3,0.5,,4\n3,1,2,-3,0.5,9,4\n"
+    )
+    S = read_log(path).S
+    assert_array_equal(S[0], [[3.0, 0.5], [0.50001, 4.0]])
+    assert_array_equal(S[1:3], [[[3.0, 0.5], [0.5, 4.0]]] * 2)
+
+
 FAULTS = {
     "empty": ("", "line of column names"),
     "no time": ("innovation_1,S_11\n1,1\n", "column time is needed; found innovation_1, S_11"),
@@ -51,6 +62,15 @@ FAULTS = {
     "no row": (HEAD, "time must hold at least one update"),
     "time goes back": (HEAD + "2,1,1\n1,1,1\n", "must not decrease; found 1 after 2"),
     "no time in a row": (HEAD + ",1,1\n", "time must be finite"),
+    "an infinite innovation": (HEAD + "1,1,1\n2,-inf,1\n", r"found innovation_1 = -inf at time 2"),
+    "two triangles": (
+        "time,innovation_1,innovation_2,S_11,S_12,S_21,S_22\n1,1,1,1,0.5,0.4,1\n",
+        r"S must be symmetric; found S_12 = 0.5 and S_21 = 0.4 at time 1",
+    ),
+    "two triangles of P": (
+        HEAD.strip() + ",error_1,error_2,P_11,P_12,P_21,P_22\n1,1,1,0,0,1,0.5,-0.5,1\n",
+        r"P must be symmetric; found P_12 = 0.5 and P_21 = -0.5 at time 1",
+    ),
     "measured without S": (HEAD + "1,1,\n", "S must be finite where there is an innovation"),
 }
 

@@ -247,7 +247,7 @@ def _deferred_cholesky(A: Array) -> tuple[Array, Array, Array]:
     """
     xp, n, batch = A.__array_namespace__(), A.shape[-1], A.shape[:-2]
     front, back = (len(batch), len(batch) + 1, *range(len(batch))), (*range(2, A.ndim), 0, 1)
-    lower = xp.where(xp.tril(xp.ones((n, n), dtype=bool)), A, A.mT)
+    lower = 1.0 * xp.where(xp.tril(xp.ones((n, n), dtype=bool)), A, A.mT)  # no whole numbers
     flat = xp.reshape(xp.permute_dims(lower, front), (-1,))  # the members innermost in memory
     a = xp.reshape(flat, (n, n, *batch))
     number, zero = xp.arange(n).reshape(n, *(1,) * len(batch)), xp.zeros_like(a[0])

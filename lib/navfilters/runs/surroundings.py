@@ -1,0 +1,158 @@
+"""What code reads beside its arguments: global names, defaults, attributes of its class.
+
+A function without a closure is not yet one that does the same later on: ``gain * x`` is another
+one where ``gain`` is another number.
+"""
+
+import dis
+import hashlib
+from collections.abc import Iterable
+from functools import cached_property, lru_cache
+from numbers import Real
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+
+from navfilters.runs.trees import Tree, flatten
+
+STEADY = {
+    *("_collections", "abc", "builtins", "cmath", "collections", "dataclasses", "functools", "jax"),
+    *("jaxlib", "math", "navfilters", "numpy", "operator", "scipy", "typing"),
+}
+"""Packages whose own names are not bound anew between two sweeps."""
+
+CALLED = ("__call__", "__getattr__")
+"""What of a class may be called beside what has a plain name: constructors are not."""
+
+OF_TUPLES = ("_asdict", "_field_defaults", "_fields", "_make", "_replace")
+
+Simple = bool | Real | complex | str | bytes | np.generic | None
+
+
+class Surroundings:
+    """What was found around the code in a tree.
+
+    Attributes
+    ----------
+    read : list of tuple
+        What is read and is a number, a text or an array: its name and its value or a hash of it.
+        Of a value with parts, its tree.
+    whole : bool
+        Whether that is all: nothing can change unseen.
+    """
+
+    def __init__(self) -> None:
+        self.read: list[tuple[Any, ...]] = []
+        self.whole = True
+        self._seen: set[Any] = set()
+
+    @classmethod
+    def of(cls, tree: Tree) -> "Surroundings":
+        """Those of all functions and classes in a tree."""
+        found = cls()
+        found._of_tree(tree)
+        return found
+
+    @property
+    def key(self) -> tuple[Any, ...] | None:
+        """Equal where the same tree does the same; None if that cannot be known."""
+        return tuple(self.read) if self.whole else None
+
+    def _of_tree(self, tree: Tree) -> None:
+        if tree.fixed is not None:
+            self._of_value(tree.fixed.value)
+        else:
+            self._of_class(tree.kind)
+        for part in tree.parts:
+            self._of_tree(part)
+
+    def _of_value(self, value: Any) -> None:
+        if isinstance(value, FunctionType):
+            self._of_function(value)
+        elif isinstance(value, type):
+            self._of_class(value)
+        elif isinstance(value, ModuleType):
+            self.whole = self.whole and _steady(value.__name__)
+        elif not isinstance(value, Simple | BuiltinFunctionType | np.ufunc):
+            self.whole = False
+            self._of_class(type(value))
+
+    def _of_function(self, function: FunctionType) -> None:
+        if function in self._seen or _steady(function.__module__):
+            return
+        self._seen.add(function)
+        names = function.__code__.co_freevars
+        for name, cell in zip(names, function.__closure__ or (), strict=True):
+            if name == "__class__":  # of super()
+                self._of_value(cell.cell_contents)
+            else:
+                self.whole = False
+        self.whole = self.whole and not function.__dict__
+        defaults = (*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values())
+        self._of_names((f"{function.__qualname__} default {i}", v) for i, v in enumerate(defaults))
+        around = function.__globals__
+        self._of_names((n, around[n]) for n in _global_names(function.__code__) if n in around)
+
+    def _of_class(self, kind: type) -> None:
+        for base in kind.__mro__:
+            if base in self._seen or _steady(base.__module__):
+                continue
+            self._seen.add(base)
+            for name, value in vars(base).items():
+                own = not name.startswith("__") or name in CALLED
+                if own and not name.startswith("_abc_") and name not in OF_TUPLES:
+                    self._of_attribute(f"{base.__qualname__}.{name}", value)
+
+    def _of_attribute(self, name: str, value: Any) -> None:
+        if isinstance(value, property):
+            parts = [value.fget]
+        elif isinstance(value, staticmethod | classmethod):
+            parts = [value.__func__]
+        elif isinstance(value, cached_property):
+            parts = [value.func]
+        elif hasattr(value, "__get__") and not isinstance(value, FunctionType):
+            # A slot, or a field of a named tuple, is in the tree.
+            self.whole = self.whole and _steady(type(value).__module__)
+            return
+        else:
+            parts = [value]
+        self._of_names((name, part) for part in parts)
+
+    def _of_names(self, named: Iterable[tuple[str, Any]]) -> None:
+        for name, value in named:
+            try:
+                tree, leaves = flatten(name, value, None)
+            except ValueError:  # an array whose meaning is more than its numbers
+                self.whole = False
+                continue
+            for leaf in leaves:
+                self._of_array(leaf.name, leaf.array)
+            if tree.fixed is not None and isinstance(value, Simple):
+                self.read.append((name, type(value).__name__, repr(value)))
+            elif tree.kind is not np.ndarray:
+                self.read.append((name, tree))
+                self._of_tree(tree)
+
+    def _of_array(self, name: str, array: np.ndarray) -> None:
+        if array.dtype.hasobject:
+            self.whole = False
+        else:
+            content = hashlib.sha256(array.tobytes()).hexdigest()
+            self.read.append((name, array.shape, array.dtype.str, content))
+
+    def numbers(self) -> list[tuple[Any, ...]]:
+        """Of what is read, what another process can compare."""
+        return [entry for entry in self.read if not isinstance(entry[-1], Tree)]
+
+
+def _steady(module: str | None) -> bool:
+    return (module or "").partition(".")[0] in STEADY
+
+
+@lru_cache(maxsize=1024)
+def _global_names(code: CodeType) -> tuple[str, ...]:
+    """The global names that code reads, and the functions within it."""
+    own = [i.argval for i in dis.get_instructions(code) if i.opname in ("LOAD_GLOBAL", "LOAD_NAME")]
+    inner = [n for c in code.co_consts if isinstance(c, CodeType) for n in _global_names(c)]
+    return tuple(dict.fromkeys(own + inner))
