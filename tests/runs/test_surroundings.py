@@ -4,12 +4,14 @@ import datetime
 import math
 from dataclasses import dataclass
 from functools import partial
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 from polar_models import quiet
+from scipy import stats
 
 from navfilters import FILTERS, Gaussian
 from navfilters.models import Linear
@@ -18,7 +20,11 @@ from navfilters.runs.trees import flatten
 
 GAIN = 1.0
 TRUTH = np.zeros(2)
-WORDS = {"gain": 1.0}
+WORDS = {0: {1.0}}
+KNOWN = {"gain": [1.0, np.ones(2)]}
+KNOWN["itself"] = KNOWN
+MINE = ModuleType("mine")
+MINE.gain = 1.0
 OBJECTS = np.array([None, 1.0])
 ONLY = np.ma.masked_array([1.0, 2.0], [True, False])
 PRIORS = Gaussian(np.array([[1.0, 2.0], [3.0, 4.0]]), np.eye(2))
@@ -122,13 +128,31 @@ def test_library_and_kinds_of_attributes_are_followed():
     assert {"GAIN", "Owner.made", "with_default default 0"} <= set(read)
 
 
+def test_dictionaries_lists_and_modules_of_ones_own_are_looked_into(monkeypatch):
+    for function, owner, name, value in (
+        (lambda x: KNOWN["gain"][0] * x, KNOWN, "gain", [2.0, np.ones(2)]),
+        (lambda x: KNOWN["gain"][1] * x, KNOWN, "gain", [2.0, np.zeros(2)]),
+        (lambda x: KNOWN["other"] * x, KNOWN, "other", 1.0),
+        (lambda x: MINE.gain * x, MINE.__dict__, "gain", 2.0),
+    ):
+        before = key_of(function)
+        assert before == key_of(function) is not None
+        monkeypatch.setitem(owner, name, value)
+        assert key_of(function) != before
+
+
+def test_what_is_installed_is_not():
+    """Else a model whose class has a use for them compiled anew for every sweep."""
+    assert key_of(lambda x: datetime.timedelta(1) * math.pi * stats.norm.pdf(x)) is not None
+    assert key_of(lambda x: FILTERS["EKF"]) == ()
+
+
 @pytest.mark.parametrize(
     "value",
     [
-        partial(lambda x: WORDS["gain"] * x),
+        partial(lambda x: WORDS[0] * x),
         lambda x: OBJECTS[1] * x,
         lambda x: ONLY[1] * x,
-        lambda x: datetime.date.today().day * x,
         lambda x: [GAIN_OF() * x for _ in range(2)],
         with_attribute,
         Owner(),
@@ -139,7 +163,7 @@ def test_what_may_change_unseen_has_no_key(value):
 
 
 def GAIN_OF():  # called within a comprehension
-    return WORDS["gain"]
+    return WORDS[0]
 
 
 def test_a_method_that_calls_its_base_is_no_closure():

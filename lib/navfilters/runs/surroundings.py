@@ -6,9 +6,12 @@ one where ``gain`` is another number.
 
 import dis
 import hashlib
+import sys
+import sysconfig
 from collections.abc import Iterable
 from functools import cached_property, lru_cache
 from numbers import Real
+from pathlib import Path
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -16,11 +19,11 @@ import numpy as np
 
 from navfilters.runs.trees import Tree, flatten
 
-STEADY = {
-    *("_collections", "abc", "builtins", "cmath", "collections", "dataclasses", "functools", "jax"),
-    *("jaxlib", "math", "navfilters", "numpy", "operator", "scipy", "typing"),
-}
-"""Packages whose own names are not bound anew between two sweeps."""
+STEADY = {"builtins", "navfilters", *sys.builtin_module_names}
+"""Packages whose own names are not bound anew between two sweeps, as those that are installed."""
+
+INSTALLED = {"site-packages", "dist-packages"}
+STANDARD = Path(sysconfig.get_path("stdlib"))
 
 CALLED = ("__call__", "__getattr__")
 """What of a class may be called beside what has a plain name: constructors are not."""
@@ -38,12 +41,15 @@ class Surroundings:
     read : list of tuple
         What is read and is a number, a text or an array: its name and its value or a hash of it.
         Of a value with parts, its tree.
+    held : list of tuple
+        The same of what dictionaries and lists hold, which the code may fill itself.
     whole : bool
         Whether that is all: nothing can change unseen.
     """
 
     def __init__(self) -> None:
         self.read: list[tuple[Any, ...]] = []
+        self.held: list[tuple[Any, ...]] = []
         self.whole = True
         self._seen: set[Any] = set()
 
@@ -57,7 +63,7 @@ class Surroundings:
     @property
     def key(self) -> tuple[Any, ...] | None:
         """Equal where the same tree does the same; None if that cannot be known."""
-        return tuple(self.read) if self.whole else None
+        return (*self.read, *self.held) if self.whole else None
 
     def _of_tree(self, tree: Tree) -> None:
         if tree.fixed is not None:
@@ -72,11 +78,22 @@ class Surroundings:
             self._of_function(value)
         elif isinstance(value, type):
             self._of_class(value)
+        elif isinstance(value, dict | list):
+            self._of_container(value)
         elif isinstance(value, ModuleType):
             self.whole = self.whole and _steady(value.__name__)
         elif not isinstance(value, Simple | BuiltinFunctionType | np.ufunc):
             self.whole = False
             self._of_class(type(value))
+
+    def _of_container(self, value: dict[Any, Any] | list[Any]) -> None:
+        if id(value) not in self._seen:
+            self._seen.add(id(value))
+            items = list(value.items() if isinstance(value, dict) else enumerate(value))
+            self.whole = self.whole and all(isinstance(key, Simple) for key, _ in items)
+            outside, self.read = self.read, self.held
+            self._of_names((repr(key), part) for key, part in items)
+            self.read = outside
 
     def _of_function(self, function: FunctionType) -> None:
         if function in self._seen or _steady(function.__module__):
@@ -91,8 +108,17 @@ class Surroundings:
         self.whole = self.whole and not function.__dict__
         defaults = (*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values())
         self._of_names((f"{function.__qualname__} default {i}", v) for i, v in enumerate(defaults))
-        around = function.__globals__
-        self._of_names((n, around[n]) for n in _global_names(function.__code__) if n in around)
+        around, (names, attributes) = function.__globals__, _names(function.__code__)
+        library = vars(sys.modules["navfilters"])
+        for name in (n for n in names if n in around):
+            value = around[name]
+            if name in library and value is library[name]:
+                continue
+            if isinstance(value, ModuleType) and not _steady(value.__name__):
+                some = (a for a in attributes if hasattr(value, a))
+                self._of_names((f"{name}.{a}", getattr(value, a)) for a in some)
+            else:
+                self._of_names([(name, value)])
 
     def _of_class(self, kind: type) -> None:
         for base in kind.__mro__:
@@ -146,13 +172,22 @@ class Surroundings:
         return [entry for entry in self.read if not isinstance(entry[-1], Tree)]
 
 
+@lru_cache(maxsize=1024)
 def _steady(module: str | None) -> bool:
-    return (module or "").partition(".")[0] in STEADY
+    top = (module or "").partition(".")[0]
+    file = Path(getattr(sys.modules.get(top), "__file__", None) or "")
+    installed = not INSTALLED.isdisjoint(file.parts) or STANDARD in file.parents
+    return top in STEADY or installed
 
 
 @lru_cache(maxsize=1024)
-def _global_names(code: CodeType) -> tuple[str, ...]:
-    """The global names that code reads, and the functions within it."""
-    own = [i.argval for i in dis.get_instructions(code) if i.opname in ("LOAD_GLOBAL", "LOAD_NAME")]
-    inner = [n for c in code.co_consts if isinstance(c, CodeType) for n in _global_names(c)]
-    return tuple(dict.fromkeys(own + inner))
+def _names(code: CodeType) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Global names that code and functions within it read; and all their names, of attributes."""
+    read = [
+        i.argval for i in dis.get_instructions(code) if i.opname in ("LOAD_GLOBAL", "LOAD_NAME")
+    ]
+    every = list(code.co_names)
+    for inner in (_names(c) for c in code.co_consts if isinstance(c, CodeType)):
+        read += inner[0]
+        every += inner[1]
+    return tuple(dict.fromkeys(read)), tuple(dict.fromkeys(every))
