@@ -47,6 +47,8 @@ class Surroundings:
         Whether that is all: nothing can change unseen.
     """
 
+    _last: tuple[Any, Any] = None, None
+
     def __init__(self) -> None:
         self.read: list[tuple[Any, ...]] = []
         self.held: list[tuple[Any, ...]] = []
@@ -55,9 +57,12 @@ class Surroundings:
 
     @classmethod
     def of(cls, tree: Tree) -> "Surroundings":
-        """Those of all functions and classes in a tree."""
-        found = cls()
-        found._of_tree(tree)
+        """Those of all functions and classes in a tree, once for the tree of a sweep."""
+        known, found = cls._last
+        if known is not tree:
+            found = cls()
+            found._of_tree(tree)
+            cls._last = tree, found
         return found
 
     @property
