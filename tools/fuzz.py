@@ -154,7 +154,8 @@ def blocks_of(name: str, seed: int, inputs: int, done: set[int], module: str) ->
                 late[now.value] += 1
                 why = f"no end after {LONGEST:.0f} s, twice"
             one.join()
-            said = (Path(folder) / "stderr").read_text(errors="replace")[-600:]
+            said = (Path(folder) / "stderr").read_text(errors="replace")
+            said = "".join(said.partition("Fatal Python error")[1:])[:600] or said[-600:]
             if one.exitcode and now.value < 0:
                 raise RuntimeError(f"{name}: a valid file is not read: {said}")
             if one.exitcode and (not why or late[now.value] > 1):

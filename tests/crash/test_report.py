@@ -70,6 +70,15 @@ def test_a_filter_without_numbers_fails():
     assert set(report.failed) >= {"linear", "motion", "missing", "exact", "jump", "units"}
 
 
+def test_a_filter_that_returns_something_else_is_told_so():
+    """Of two states the mean alone was taken apart as if it were mean and covariance."""
+    alone = from_functions(lambda x, P, d: (x, P), lambda x, P, z, model: x)
+    report = crash_test(alone, ["decades"], progress=False)
+    assert "must return mean and cov of shapes (2,) and (2, 2); found (1,) and ()" in str(report)
+    certain = from_functions(lambda x, P, d: (x, P), lambda x, P, z, model: (x, 0 * P))
+    assert crash_test(certain, ["decades"], progress=False).failed == ("decades",)
+
+
 def test_what_is_not_asked_does_not_fail():
     report = crash_test(ekf(), ["images, TC-1"], progress=False)
     assert report.passed

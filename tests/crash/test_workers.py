@@ -2,14 +2,17 @@
 
 import os
 import sys
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from navfilters import FILTERS
+from navfilters import FILTERS, Gaussian, run
 from navfilters.crash import CHECKS, SUITES, crash_test, from_functions
 from navfilters.crash.planted import textbook_ekf as ekf
 from navfilters.crash.subject import Subject
 from navfilters.crash.suite import updates
+from navfilters.models import RangeBearing
 from navfilters.problems import static_fix
 
 
@@ -91,3 +94,16 @@ def test_what_is_raised_names_its_member():
 def test_bad_workers_are_refused():
     with pytest.raises(ValueError, match="workers must be an integer of at least 1; found 0"):
         crash_test(ekf(), ["linear"], workers=0)
+
+
+def test_models_with_batch_axes_are_refused_by_name():
+    """The shape of their product with one state was refused, whatever it was."""
+    many = RangeBearing(np.eye(2) * np.ones((3, 1, 1)))
+    still = SimpleNamespace(Q=many.R, f=lambda x: x, transition=lambda x: (x, np.eye(2)))
+    prior = Gaussian(np.array([3.0, 4.0]), np.eye(2))
+    for name, model, dynamics in (
+        ("model.R", many, None),
+        ("dynamics.Q", RangeBearing(many.R[0]), still),
+    ):
+        with pytest.raises(ValueError, match=rf"no batch axes.*found {name} of shape \(3, 2, 2\)"):
+            run(ekf(), prior, np.ones(2), model, 1, dynamics=dynamics)

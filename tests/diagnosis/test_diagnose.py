@@ -151,6 +151,25 @@ def test_an_indefinite_S_is_a_finding():
     assert "not positive definite at 1" in found.findings[0]
 
 
+def test_a_singular_S_is_a_finding_whatever_its_rounding():
+    """An eigenvalue a little above zero had no Cholesky factor, and ended the diagnosis."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        v = rng.normal(size=3)
+        S = np.tile(np.eye(3), (20, 1, 1))
+        S[7] = np.outer(v, v)
+        assert diagnose(Log(np.arange(20.0), rng.normal(size=(20, 3)), S)).indefinite == 1
+
+
+def test_a_bias_of_few_updates_is_that_of_student():
+    """Of right filters with four updates as many are called biased as the test allows."""
+    rng, tail = np.random.default_rng(1), 0.05 / 4 / 2
+    for y in rng.normal(size=(200, 4, 1)) + rng.normal(size=(200, 1, 1)):
+        found = diagnose(Log(np.arange(4.0), y, np.ones((4, 1, 1))))
+        wanted = stats.ttest_1samp(y[:, 0], 0.0).pvalue < 2 * tail
+        assert found.channels[0].biased == wanted
+
+
 def test_units_change_nothing():
     log, D = kalman_log(told_r=0.5), np.diag([1e3, 1e-6])
     scaled = Log(log.time, log.innovation @ D, D @ log.S @ D)

@@ -37,6 +37,17 @@ def test_either_triangle_long_names_and_other_columns(tmp_path):
     assert log.ignored == ("note",)
 
 
+def test_both_triangles_may_differ_by_rounding_and_have_empty_cells(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "time,innovation_1,innovation_2,S_11,S_12,S_21,S_22\n"
+        "0,1,2,3,0.5,0.50001,4\n1,1,2,3,,0.5,4\n2,1,2,3,0.5,,4\n3,1,2,-3,0.5,9,4\n"
+    )
+    S = read_log(path).S
+    assert_array_equal(S[0], [[3.0, 0.5], [0.50001, 4.0]])
+    assert_array_equal(S[1:3], [[[3.0, 0.5], [0.5, 4.0]]] * 2)
+
+
 FAULTS = {
     "empty": ("", "line of column names"),
     "no time": ("innovation_1,S_11\n1,1\n", "column time is needed; found innovation_1, S_11"),
@@ -51,6 +62,15 @@ FAULTS = {
     "no row": (HEAD, "time must hold at least one update"),
     "time goes back": (HEAD + "2,1,1\n1,1,1\n", "must not decrease; found 1 after 2"),
     "no time in a row": (HEAD + ",1,1\n", "time must be finite"),
+    "an infinite innovation": (HEAD + "1,1,1\n2,-inf,1\n", r"found innovation_1 = -inf at time 2"),
+    "two triangles": (
+        "time,innovation_1,innovation_2,S_11,S_12,S_21,S_22\n1,1,1,1,0.5,0.4,1\n",
+        r"S must be symmetric; found S_12 = 0.5 and S_21 = 0.4 at time 1",
+    ),
+    "two triangles of P": (
+        HEAD.strip() + ",error_1,error_2,P_11,P_12,P_21,P_22\n1,1,1,0,0,1,0.5,-0.5,1\n",
+        r"P must be symmetric; found P_12 = 0.5 and P_21 = -0.5 at time 1",
+    ),
     "measured without S": (HEAD + "1,1,\n", "S must be finite where there is an innovation"),
 }
 
@@ -102,12 +122,39 @@ def test_a_parquet_column_of_no_text_is_refused(tmp_path):
         read_log(path)
 
 
+@pytest.mark.parametrize("column", ["note", "S_12"])
+def test_text_in_parquet_that_is_no_text(tmp_path, column):
+    """What a log does not use is not looked at; what it uses is refused."""
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    table = {"time": [0.0], "innovation_1": [1.0], "S_11": [2], column: ["remark"]}
+    path = tmp_path / "log.parquet"
+    parquet.write_table(pyarrow.table(table), path, compression="none", write_statistics=False)
+    path.write_bytes(path.read_bytes().replace(b"remark", b"re\xedark"))
+    if column == "note":
+        assert read_log(path).ignored == ("note",)
+    else:
+        with pytest.raises(LogError, match=r"log\.parquet: a Parquet file .*Invalid UTF8"):
+            read_log(path)
+
+
 def test_a_parquet_column_of_dates_is_refused(tmp_path):
     pyarrow = pytest.importorskip("pyarrow")
     parquet = pytest.importorskip("pyarrow.parquet")
     table = {"time": ["2010-11-02"], "innovation_1": [1.0], "S_11": [2]}
     parquet.write_table(pyarrow.table(table), tmp_path / "log.parquet")
     with pytest.raises(LogError, match="time must be numbers; found string"):
+        read_log(tmp_path / "log.parquet")
+
+
+def test_a_parquet_column_that_numpy_cannot_hold_is_refused(tmp_path):
+    """Times of day in nanoseconds, which Arrow gives as Python's, of microseconds."""
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    times = pyarrow.array([1], pyarrow.time64("ns"))
+    table = {"time": times, "innovation_1": [1.0], "S_11": [2]}
+    parquet.write_table(pyarrow.table(table), tmp_path / "log.parquet")
+    with pytest.raises(LogError, match=r"log\.parquet: .*nanoseconds"):
         read_log(tmp_path / "log.parquet")
 
 

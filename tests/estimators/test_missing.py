@@ -12,9 +12,11 @@ from scipy.stats import multivariate_normal
 from navfilters import FILTERS, Filter, Gaussian, linearized, run, sweep
 from navfilters.estimators.adaptive import AdaptiveNoise
 from navfilters.estimators.gated_inflation import GatedInflation
+from navfilters.estimators.interacting import InteractingModels, Modes
 from navfilters.estimators.robust import AdaptiveRobust, Robust
 from navfilters.estimators.strong_tracking import StrongTracking
 from navfilters.estimators.update import FORMS
+from navfilters.estimators.variational_noise import VariationalNoise
 from navfilters.models import Linear, RangeBearing
 from navfilters.runs import records
 
@@ -186,3 +188,31 @@ def test_a_failed_member_has_no_log_likelihood():
         state = Filter().update(Filter().init(prior), z, MODEL)
         assert np.isnan(state.log_likelihood).tolist() == [False, False, True, False]
     assert state.missed.tolist() == [0] * 4
+
+
+ESTIMATORS = {name: Filter(rule=rule) for name, rule in RULES.items()} | {
+    "a function": lambda prior, z, model: FILTERS["EKF"](prior, z, model),
+    "UKF": FILTERS["UKF"],
+    "learnt noise": VariationalNoise(),
+    "models": InteractingModels(),
+}
+
+
+@pytest.mark.parametrize("lead", [(), (3, 1), (3, 5), (5, 5)])
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_members_of_a_grid_miss_their_own_measurements(name, lead):
+    """A z of five members for a grid of five by five: rows were kept where columns were meant."""
+    rng = np.random.default_rng(2)
+    prior, model = Gaussian(rng.normal(size=(*lead, 2)), np.eye(2)), Linear(np.eye(2), np.eye(2))
+    z = 3 * rng.normal(size=(6, 5, 2))
+    z[rng.random(z.shape) < 0.4] = np.nan
+    motion = Drift(0.1 * np.eye(2))
+    motion = Modes((motion, motion)) if name == "models" else motion
+    options = {"dynamics": motion, "z_per_step": True}
+    found = run(ESTIMATORS[name], prior, z, model, **options)
+    means = np.broadcast_to(prior.mean, (*np.broadcast_shapes(lead, (5,)), 2))
+    for index in np.ndindex(means.shape[:-1]):
+        alone = Gaussian(means[index], prior.cov)
+        wanted = run(ESTIMATORS[name], alone, z[:, index[-1]], model, **options)
+        for ours, theirs in zip(found, wanted, strict=True):
+            assert_allclose(ours[:, *index], theirs, rtol=1e-9, atol=1e-12)

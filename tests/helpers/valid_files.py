@@ -145,8 +145,15 @@ def pictures(path: Path) -> list[bytes]:
 
 
 def parquet(path: Path) -> list[bytes]:
+    """Also one as another program may write it: whole numbers, a gap, text, not compressed."""
+    import pyarrow.parquet
+
     short = Log(np.arange(5.0), np.full((5, 1), 0.5), np.full((5, 1, 1), 2.0))
-    return [write_log(log, path).read_bytes() for log in (short, kalman_log(steps=30))]
+    files = [write_log(log, path).read_bytes() for log in (short, kalman_log(steps=30))]
+    columns = {"time": [0, 1, 2], "innovation_1": [0.5, None, -0.25], "S_11": [2, 2, 2],
+               "note": ["first", "second, late", "third"]}  # fmt: skip
+    pyarrow.parquet.write_table(pyarrow.table(columns), path, compression="none")
+    return [*files, path.read_bytes()]
 
 
 def leaders(path: Path) -> list[bytes]:

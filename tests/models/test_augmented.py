@@ -1,10 +1,12 @@
 """A sensor of some states: its values, its Jacobian and its refusals."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters.models import Augmented, Linear, RangeBearing
+from navfilters.models import Augmented, ConvertedRangeBearing, Linear, RangeBearing
 from navfilters.numerics.complex_step import complex_step
 
 SENSOR = RangeBearing(np.diag([0.1, 1e-3]))
@@ -35,3 +37,17 @@ def test_it_is_the_sensor_and_a_bias():
 def test_what_does_not_fit_is_named(own, matrix, message):
     with pytest.raises(ValueError, match=message):
         Augmented(SENSOR, own, matrix)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "found"),
+    [
+        (ConvertedRangeBearing(np.diag([0.1, 1e-3])), "ConvertedRangeBearing with noise"),
+        (SimpleNamespace(R=np.eye(2), h=SENSOR.h), "SimpleNamespace with no jacobian"),
+        (SimpleNamespace(R=np.eye(2), at=lambda k: SENSOR), "SimpleNamespace with at, which would"),
+    ],
+)
+def test_what_cannot_be_passed_on_is_refused(sensor, found):
+    """A converted measurement was compared with a place, unconverted, by the noise of a bearing."""
+    with pytest.raises(ValueError, match=f"sensor must have R, h and jacobian.*found {found}"):
+        Augmented(sensor, 2, B)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from navfilters import FILTERS, Filter, Gaussian, SigmaPoints, run, sweep
+from navfilters import FILTERS, Filter, Gaussian, SigmaPoints, run, sweep, unscented
 from navfilters.estimators.adaptive import AdaptiveNoise
 from navfilters.estimators.continuous import ContinuousSystem, extended_kalman_bucy
 from navfilters.estimators.robust import AdaptiveRobust, Robust
-from navfilters.models import RangeBearing
+from navfilters.models import Linear, RangeBearing
 from navfilters.numerics import validation
 from navfilters.runs.chi_square import chi_square_band
 from navfilters.runs.consistency import coverage
@@ -190,3 +190,31 @@ def test_a_number_is_kept_as_pythons():
     assert type(Orbit(step=np.array(2.0)).step) is float
     assert type(replace(AdaptiveNoise(), N=np.array(7)).N) is int
     assert validation.number("x", np.float32(0.5), above=0) == 0.5
+
+
+class OfTheStatesType:
+    """An h whose value is made as an array like its argument."""
+
+    R = np.eye(1)
+
+    def h(self, x):
+        value = np.zeros_like(x[..., :1])
+        value[..., 0] = x[..., 0] ** 2 / 10
+        return value
+
+
+@pytest.mark.parametrize("cov", [np.diag([50, 0]), np.array([[2, 2], [2, 2]]), np.diag([4, 3])])
+@pytest.mark.parametrize("name", ["EKF", "mtSOF", "UKF", "UKFz"])
+def test_a_prior_of_whole_numbers_is_one_of_real_ones(name, cov):
+    """np.diag([50, 0]) has whole numbers: so had its root, 7 instead of 7.07."""
+    for model in (OfTheStatesType(), Linear(np.eye(2)[:1], np.eye(1))):
+        whole = FILTERS[name](Gaussian(np.array([5, 2]), cov), np.array([3]), model)
+        real = FILTERS[name](Gaussian(np.array([5.0, 2.0]), 1.0 * cov), np.array([3.0]), model)
+        assert_array_equal(whole.mean, real.mean)
+        assert_array_equal(whole.cov, real.cov)
+
+
+def test_moments_of_a_prior_of_whole_numbers():
+    model, cov = Linear(np.eye(2), np.eye(2)), np.diag([50, 0])
+    got, wanted = (unscented(Gaussian(np.zeros(2), P), model) for P in (cov, 1.0 * cov))
+    assert_array_equal(got.P_zz, wanted.P_zz)

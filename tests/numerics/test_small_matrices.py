@@ -31,6 +31,17 @@ def test_matmul_is_the_product(n, k, m):
     assert_allclose(got, A @ B, rtol=0, atol=1e-15 * k * np.abs(A).max() * np.abs(B).max())
 
 
+@pytest.mark.parametrize(("n", "k", "m"), [(1, 3, 1), (6, 1, 2), (3, 6, 6), (6, 6, 5), (7, 7, 7)])
+@pytest.mark.parametrize("batches", [((), ()), ((4, 1), (5,)), ((), (5,)), ((2, 5), (5,))], ids=str)
+def test_matmul_is_the_product_compiled(n, k, m, batches):
+    jax = pytest.importorskip("jax")
+    rng = np.random.default_rng(0)
+    A, B = (rng.normal(size=(*b, *c)) for b, c in zip(batches, ((n, k), (k, m)), strict=True))
+    with jax.enable_x64(True):
+        got = jax.jit(matmul)(A, B)
+    assert_allclose(got, A @ B, rtol=0, atol=1e-14 * k, strict=True)
+
+
 @pytest.mark.parametrize(("n", "m"), [(n, m) for n in (1, 2, 3) for m in (1, 2, 3)])
 @pytest.mark.parametrize("k", [1, 4])
 def test_outer_sum_is_the_sum_of_outer_products(n, m, k):

@@ -156,3 +156,32 @@ def test_half_a_file_does_not_count(tmp_path):
     whole = tmp_path / "chunk-000000.npz"
     whole.rename(whole.with_suffix(".part"))
     assert_same(stored(tmp_path), wanted)
+
+
+class ClassWide:
+    """A sensor as the tutorial writes it: what it has, it has of its class."""
+
+    R = np.array([[4.0]])
+    scale = 1.0
+
+    def h(self, x):
+        return self.scale * x[..., :1] * GAIN
+
+
+GAIN = 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("R", np.array([[9.0]])), ("scale", 2.0), ("GAIN", 2.0)]
+)
+def test_numbers_of_a_class_and_global_ones_belong_to_the_sweep(tmp_path, monkeypatch, name, value):
+    """They were not looked at: what was stored with the old ones was taken for the result."""
+    changes = {"model": ClassWide(), "z": np.array([5.0])}
+    wanted = stored(tmp_path, **changes)
+    assert_same(stored(tmp_path, **changes), wanted)
+    if name == "GAIN":
+        monkeypatch.setitem(globals(), name, value)
+    else:
+        monkeypatch.setattr(ClassWide, name, value)
+    with pytest.raises(ValueError, match="belongs to another sweep"):
+        stored(tmp_path, **changes)

@@ -7,7 +7,7 @@ import pytest
 from histories import BASE, EKF, MODEL, NOISES, PRIORS, history
 from numpy.testing import assert_allclose
 
-from navfilters import Filter, Gaussian, run
+from navfilters import FILTERS, Filter, Gaussian, SigmaPoints, run
 from navfilters.models import Linear, RangeBearing
 
 
@@ -251,3 +251,9 @@ def test_a_semidefinite_prior_is_taken(cov):
     got = history(prior=Gaussian([20.0, 80.0], cov), steps=1)
     null = np.linalg.eigh(cov)[1][:, 0]
     assert_allclose(null @ (got.mean[1] - got.mean[0]), 0.0, atol=1e-10)
+
+
+def test_an_option_without_a_name_is_refused():
+    """It was left out: the filter ran with its own sigma points."""
+    with pytest.raises(TypeError, match=r"by name, as points=SigmaPoints\(\); found SigmaPoints"):
+        run(partial(FILTERS["UKF"], SigmaPoints(0.5)), PRIORS, BASE.z, MODEL, 1)

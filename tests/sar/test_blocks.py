@@ -1,5 +1,8 @@
 """Interpolated phase factors against all the sines and cosines."""
 
+from contextlib import suppress
+from threading import Barrier, BrokenBarrierError, Event, get_ident
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -57,9 +60,63 @@ def test_results_come_in_the_order_of_the_parts(monkeypatch, threads):
     assert in_threads(lambda k: k * k, range(50)) == [k * k for k in range(50)]
 
 
+def threads_at_work(patience):
+    """Those that share two parts, each of which waits for another thread to take the other."""
+    both = Barrier(2)
+
+    def met(_):
+        with suppress(BrokenBarrierError):  # one thread does one after the other
+            both.wait(patience)
+        return get_ident()
+
+    return set(in_threads(met, range(2)))
+
+
+@pytest.mark.parametrize("slow", [0, 1])
+def test_two_threads_at_most_are_at_work(monkeypatch, slow):
+    """Parts of a part have the second thread when it has nothing left to do, and not before."""
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    both, ended = Barrier(2, timeout=60), Event()
+
+    def work(part):
+        both.wait()
+        if part != slow:
+            alone = threads_at_work(0.05)
+            ended.set()
+            return alone
+        assert ended.wait(timeout=60)
+        for _ in range(100):  # the other thread is about to end
+            if len(found := threads_at_work(0.05)) == 2:
+                break
+        return found
+
+    found = in_threads(work, range(2))
+    assert [len(threads) for threads in found] == ([2, 1] if slow == 0 else [1, 2])
+    assert len(threads_at_work(60)) == 2
+
+
 def test_errors_leave_the_threads():
     def work(lines):
         raise ZeroDivisionError("in a thread")
 
     with pytest.raises(ZeroDivisionError, match="in a thread"):
         in_threads(work, blocks(10, 2))
+
+
+def test_an_error_gives_the_second_thread_back(monkeypatch):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    test_errors_leave_the_threads()
+    assert len(threads_at_work(60)) == 2
+
+
+def test_after_an_error_nothing_more_is_begun(monkeypatch):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    begun = []
+
+    def work(part):
+        begun.append(part)
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        in_threads(work, range(100))
+    assert len(begun) <= 2

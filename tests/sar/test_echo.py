@@ -88,6 +88,23 @@ def test_window_of_the_paper(flight, hit):
         centred_window(PALSAR, flight, hit, lines=101)
 
 
+@pytest.mark.parametrize(("oversampling", "dR"), [(1, 0.0), (3, -150.0), (1, 2000.0)])
+def test_the_echo_of_a_point_is_its_formula(flight, hit, oversampling, dR):
+    """a(angle) rect((t - 2R/c) / T) exp(i pi K (t - 2R/c - T/2)^2 - 4 i pi R / wavelength)"""
+    whole = centred_window(PALSAR, flight, hit, 16, 16)
+    window = Window(whole.first_time + 1.0, 2500, 77, whole.near_range + dR)
+    t = window.first_time + np.arange(window.pulses)[:, None] / PALSAR.prf
+    R, pattern = _history(PALSAR, flight, hit, t)
+    into = np.arange(oversampling * window.ranges) / (oversampling * PALSAR.sampling)
+    into = into + 2 * (window.near_range - R) / 299792458.0
+    chirp = np.exp(1j * np.pi * PALSAR.chirp_rate * (into - PALSAR.pulse_length / 2) ** 2)
+    wanted = pattern * chirp * np.exp(-4j * np.pi * R / PALSAR.wavelength)
+    wanted[(into < 0) | (into >= PALSAR.pulse_length)] = 0
+    assert wanted.any()
+    echo = point_echo(PALSAR, flight, hit, window, oversampling)
+    assert_allclose(echo, wanted, rtol=0, atol=1e-10)
+
+
 @pytest.mark.parametrize("squint", [0.2, -0.2])
 def test_a_beam_that_looks_ahead_meets_a_point_earlier(small, flight, hit, squint):
     looking = replace(small, squint=squint)

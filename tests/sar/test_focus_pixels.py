@@ -13,7 +13,7 @@ from focused_points import (
     response,
     velocity_at,
 )
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.constants import c
 from scipy.fft import next_fast_len
 
@@ -181,6 +181,51 @@ def test_a_patch_of_a_patch():
 def test_patch_refuses(samples, velocity, message):
     with pytest.raises(ValueError, match=message):
         Focuser(hyperbola(7182.0)).patch(samples, velocity)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"bandwidth": 900.0},
+        {"bandwidth": 1710.0, "doppler_centroid": 700.0},
+        {"doppler_centroid": -3000.0},
+        {"migration": False},
+        {},
+    ],
+)
+@pytest.mark.parametrize("first", [{}, {"doppler_centroid": 500.0, "migration": False}])
+def test_otherwise_is_another_focuser_of_the_same_data(first, options):
+    raw, size = noise(), {"lines": 512, "samples": 300}
+    found = Focuser(raw, **size, **first).otherwise(**options).image(7182.0, -1.86)
+    wanted = Focuser(raw, **size, **options).image(7182.0, -1.86)
+    assert_array_equal(found.pixels, wanted.pixels)
+    assert found[1:] == wanted[1:]
+
+
+def test_otherwise_leaves_the_first_focuser_as_it_is():
+    focuser = Focuser(ground(), samples=301, bandwidth=1710.0)
+    before = focuser.image(7182.0).pixels
+    focuser.otherwise(bandwidth=400.0, migration=False).image(7000.0)
+    assert_array_equal(focuser.image(7182.0).pixels, before)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({}, "bandwidth must stay within the band of this focuser; found None Hz about 0.0"),
+        ({"bandwidth": 1000.0, "doppler_centroid": 1.0}, "found 1000.0 Hz about 1.0"),
+        ({"bandwidth": 2151.0}, r"bandwidth must be in \(0, 2150.0\] Hz"),
+    ],
+)
+def test_otherwise_refuses(options, message):
+    with pytest.raises(ValueError, match=message):
+        Focuser(hyperbola(7182.0), bandwidth=1000.0).otherwise(**options)
+
+
+def test_a_patch_is_not_processed_otherwise():
+    patch = Focuser(hyperbola(7182.0)).patch(64, 7182.0)
+    with pytest.raises(ValueError, match="a patch must be taken of what is processed otherwise"):
+        patch.otherwise(bandwidth=1000.0)
 
 
 def in_arrays():

@@ -1,5 +1,7 @@
 """An orbit as a filter's dynamics: both engines, the thrust's time, the paths of many updates."""
 
+import math
+from functools import partial
 from itertools import product
 
 import jax
@@ -8,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from navfilters.space import variations
 from navfilters.space.inertial_orbit import Orbit
 from navfilters.space.thrust import COASTING, Thrust
 from navfilters.space.variations import series
@@ -139,10 +142,19 @@ def test_strength_takes_arrays_of_times():
 
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_series_is_the_exponential_to_an_order(order):
+    """Of members behind the matrices; of no V without one."""
     rng = np.random.default_rng(1)
-    A, M = rng.normal(size=(2, 6, 6))
-    terms = [M, A @ M / 10, A @ A @ M / 200, A @ A @ A @ M / 6000]
-    assert_allclose(series(lambda X: A @ X, 0.1, order, M), sum(terms[: order + 1]), rtol=1e-12)
+    G, V = rng.normal(size=(2, 3, 3, 4))
+    M = rng.normal(size=(6, 5, 4))
+    for of_v in (None, partial(variations.product, V)):
+        got = np.concatenate(series(partial(variations.rates, G, of_v), 0.1, order, M[:3], M[3:]))
+        for i in range(4):
+            A = np.block(
+                [[np.zeros((3, 3)), np.eye(3)], [G[..., i], V[..., i] * (of_v is not None)]]
+            )
+            terms = [M[..., i] / math.factorial(k) for k in range(order + 1)]
+            wanted = sum(np.linalg.matrix_power(A / 10, k) @ terms[k] for k in range(order + 1))
+            assert_allclose(got[..., i], wanted, rtol=1e-12)
 
 
 def test_a_bad_start_is_refused():

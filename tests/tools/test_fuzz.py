@@ -1,11 +1,14 @@
 """The fuzzer itself: an input is known by its number, and each way to break a reader is seen."""
 
+import io
 import random
+import threading
 
 import damage
 import damage_steps
 import fuzz
 import pytest
+import valid_files
 from readers import READERS
 
 
@@ -35,6 +38,22 @@ def test_damage_stands_any_bytes(layout):
             step(data, draw, b"other")
 
 
+def test_damage_leaves_no_object_to_threads(monkeypatch, tmp_path):
+    """tracemalloc, stopped while a thread of Arrow frees what it read, ends the interpreter."""
+    pytest.importorskip("pyarrow")
+    readers_of_bytes = set()
+
+    class Told(io.BytesIO):
+        def read(self, size=-1):
+            readers_of_bytes.add(threading.get_ident())
+            return super().read(size)
+
+    whole = valid_files.parquet(tmp_path / "log.parquet")[0]
+    monkeypatch.setattr(damage.io, "BytesIO", Told)
+    damage.column(bytearray(whole), random.Random(1), whole)
+    assert readers_of_bytes == {threading.get_ident()}
+
+
 @pytest.fixture
 def studied(monkeypatch, tmp_path):
     """Blocks of four inputs each; one that hangs does so for a second."""
@@ -55,7 +74,7 @@ def studied(monkeypatch, tmp_path):
         ("raises", "KeyError: 'file'"),
         ("hides the name", "it is wrong"),
         ("takes memory", "64.0 MiB"),
-        ("ends the interpreter", "interpreter ended with -6"),
+        ("ends the interpreter", "interpreter ended with -6: Fatal Python error: Aborted"),
         ("hangs", "no end after 1 s, twice"),
     ],
 )

@@ -46,7 +46,10 @@ class Adapted:
     def step(
         self, state: FilterState, z: Array, sensor: Any, dynamics: Any = None, k: Array = 0
     ) -> FilterState:
-        """A prediction, where there are dynamics, and an update, of every member."""
+        """A prediction, where there are dynamics, and an update, of every member.
+
+        ValueError for models with batch axes, which one state at a time cannot have.
+        """
         z, sensor = model_parts.seen(np.asarray(z, float), sensor, k)
         mean, cov = state.estimate
         m, n = z.shape[-1], mean.shape[-1]
@@ -55,6 +58,12 @@ class Adapted:
         covs = np.broadcast_to(cov, (*batch, n, n)).reshape(-1, n, n)
         seen = np.broadcast_to(z, (*batch, m)).reshape(-1, m)
         moved = None if dynamics is None else model_parts.at(dynamics, k)
+        for name, model, noise in (("model", sensor, "R"), ("dynamics", moved, "Q")):
+            if np.ndim(getattr(model, noise, 0)) > 2:
+                raise ValueError(
+                    f"{name} must have no batch axes for a filter of one state at a time; found "
+                    f"{name}.{noise} of shape {np.shape(getattr(model, noise))}"
+                )
         with warnings.catch_warnings():  # one per member and step would bury the report
             warnings.simplefilter("ignore")
             new = [self._one(*each, sensor, moved) for each in zip(means, covs, seen, strict=True)]
@@ -68,13 +77,20 @@ class Adapted:
         """Mean, covariance, innovation and S of a member, the last two NaN where not measured."""
         x, P, kept = x.copy(), P.copy(), np.flatnonzero(~np.isnan(z))
         y, S = np.full(z.shape, np.nan), np.full(z.shape * 2, np.nan)
+        shapes = x.shape, P.shape
         if dynamics is not None:
             x, P = self.predict(x, P, _additive(dynamics, x, P))
         if kept.size:
             x, P, *told = self.update(x, P, z, _measuring(sensor, np.reshape(x, -1)))
             if self.innovations:
                 y[kept], S[np.ix_(kept, kept)] = np.reshape(told[0], -1), told[1]
-        return np.asarray(x, float).reshape(-1), np.asarray(P, float), y, S
+        found = np.asarray(x, float).reshape(-1), np.asarray(P, float)
+        if (found[0].shape, found[1].shape) != shapes:
+            raise ValueError(
+                f"predict and update must return mean and cov of shapes {shapes[0]} and "
+                f"{shapes[1]}; found {found[0].shape} and {found[1].shape}"
+            )
+        return *found, y, S
 
 
 class _With:

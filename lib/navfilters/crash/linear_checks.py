@@ -148,4 +148,6 @@ def ten_decades(subject: Subject) -> Iterator[Case]:
     off = np.abs(found.mean[-1, 0] - x) / deviation
     yield Case(label, "deviations from the truth", float(off.max()), 1.0)
     size = np.sqrt(np.abs(np.diag(cov))) / deviation
-    yield Case(label, "factor of its deviations", float(max(size.max(), 1 / size.min())), 2.0)
+    with np.errstate(divide="ignore"):
+        factor = float(max(size.max(), 1 / size.min()))
+    yield Case(label, "factor of its deviations", factor, 2.0)

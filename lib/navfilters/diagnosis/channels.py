@@ -77,7 +77,7 @@ def channel(number: int, y: Array, variance: Array, white: Array, tail: float) -
         return Channel(number, 0, *four, (nothing,) * 3, 0.0, 0, 0.0, False, False)
     n, bias, scale = len(r), float(r.mean()), float(np.mean(r**2))
     low, high = (scale * n / quantile(p, n) for p in (1 - tail, tail))
-    spread = r.std() if n > 1 else 1.0
+    spread = r.std(ddof=1) if n > 1 else 1.0  # of Student's t
     limit = stdtrit(max(n - 1, 1), 1 - tail)
     biased = bool(n > 1 and abs(bias) * np.sqrt(n) > limit * spread)
     u = white[np.isfinite(white)]

@@ -11,6 +11,7 @@ from navfilters.diagnosis.channels import Channel, channel
 from navfilters.diagnosis.log_file import Log
 from navfilters.numerics import validation
 from navfilters.numerics.chi_square import quantile
+from navfilters.numerics.small_matrices import EPS, cholesky
 from navfilters.runs.chi_square import tail_of
 from navfilters.runs.consistency import nees
 from navfilters.types import Array
@@ -98,7 +99,8 @@ def diagnose(
     window : int
         Updates in a window, at least 10.
     confidence : float
-        Probability that a filter that is right passes all tests together.
+        Probability that a filter that is right passes all tests together. The test of colour is
+        approximate where updates are few: 0.95 was 0.935 to 0.955 for 20 to 200 of them.
 
     Returns
     -------
@@ -160,11 +162,15 @@ def _whitened(y: Array, S: Array) -> tuple[Array, Array, Array, int]:
             continue
         rows = np.flatnonzero((measured == pattern).all(axis=1))
         part = S[np.ix_(rows, pattern, pattern)]
-        sound = np.isfinite(part).all((1, 2))
-        sound[sound] = np.linalg.eigvalsh(part[sound])[:, 0] > 0
+        with np.errstate(invalid="ignore"):
+            variance = np.diagonal(part, axis1=1, axis2=2)
+            scale = 1 / np.sqrt(np.where(variance > 0, variance, np.nan))  # metres, microradians
+            L = cholesky(scale[:, :, None] * part * scale[:, None, :])
+            left = np.diagonal(L, axis1=1, axis2=2) ** 2
+        sound = np.isfinite(L).all((1, 2)) & (left > 8 * left.shape[1] * EPS).all(1)
         bad[rows[~sound]] = True
-        L = np.linalg.cholesky(part[sound])
-        u = np.linalg.solve(L, y[np.ix_(rows[sound], pattern)][..., None])[..., 0]
+        scaled = (scale * y[np.ix_(rows, pattern)])[sound]
+        u = np.linalg.solve(L[sound], scaled[..., None])[..., 0]
         white[np.ix_(rows[sound], pattern)] = u
     dof = np.where(bad, 0, measured.sum(axis=1))
     nis = np.where(dof > 0, np.nansum(white**2, axis=1), np.nan)

@@ -18,6 +18,11 @@ _VECTOR = re.compile(r"(innovation|error)_(\d+)")
 _MATRIX = re.compile(r"([SP])_(?:(\d)(\d)|(\d+)_(\d+))")
 
 
+SYMMETRY = 1e-3
+"""Largest difference of a covariance from its transpose, as a correlation, that says nothing: of a
+filter in single precision, or of numbers that were written with few digits."""
+
+
 class LogError(ValueError):
     """A log that cannot be read; says where and what is needed."""
 
@@ -45,7 +50,7 @@ class Log:
     ------
     LogError
         Shapes that do not fit, times that decrease or are not finite, no update, an innovation
-        that was measured and has no variance.
+        that was measured and has no variance or is infinite, an S or P that is not symmetric.
     """
 
     time: Array
@@ -70,6 +75,14 @@ class Log:
         if self.error is not None:
             _fits("error", self.error, "P", self.P, len(self.time))
         _times(self.time)
+        if np.isinf(self.innovation).any():
+            row, channel = np.argwhere(np.isinf(self.innovation))[0]
+            raise LogError(
+                "innovation must be finite, or NaN where it was not measured; found innovation_"
+                f"{channel + 1} = {self.innovation[row, channel]} at time {self.time[row]:g}"
+            )
+        for name, matrix in (("S", self.S), ("P", self.P)):
+            _symmetric(name, matrix, self.time)
         measured = np.isfinite(self.innovation)
         blind = measured & ~np.isfinite(np.diagonal(self.S, axis1=1, axis2=2))
         if blind.any():
@@ -87,6 +100,22 @@ def _fits(name: str, vector: Array, other: str, matrix: Array | None, count: int
         raise LogError(
             f"time, {name} and {other} must have shapes (k,), (k, n) and (k, n, n) with n at least "
             f"1; found ({count},), {vector.shape} and {matrix.shape}"
+        )
+
+
+def _symmetric(name: str, matrix: Array | None, time: Array) -> None:
+    if matrix is None:
+        return
+    variance = np.diagonal(matrix, axis1=1, axis2=2)
+    deviation = np.sqrt(np.where(variance > 0, variance, np.inf))  # an indefinite one is a finding
+    allowed = SYMMETRY * deviation[:, :, None] * deviation[:, None, :]
+    with np.errstate(invalid="ignore"):
+        apart = np.argwhere(np.abs(matrix - matrix.mT) > allowed)  # NaN is no difference
+    if len(apart):
+        k, i, j = apart[0]
+        raise LogError(
+            f"{name} must be symmetric; found {_names(name, i + 1, j + 1)[0]} = {matrix[k, i, j]:g}"
+            f" and {_names(name, j + 1, i + 1)[0]} = {matrix[k, j, i]:g} at time {time[k]:g}"
         )
 
 
@@ -221,19 +250,20 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
 def _parquet(path: Path) -> dict[str, np.ndarray]:
     parquet = needed("pyarrow.parquet", "pyarrow", "a log in Parquet")
     try:
-        table = parquet.read_table(path)
-        names = table.column_names
+        dataset = parquet.ParquetDataset(path)
+        names = dataset.schema.names
+        table = dataset.read([name for name in names if _used(name)])
+        table.validate(full=True)  # Arrow's readers may return what is not valid, and say so
+        arrays = {name: table[name].to_numpy() for name in table.column_names}
     except FileNotFoundError:
         raise
     except Exception as error:  # pyarrow raises nearly anything
         raise LogError(f"{path}: a Parquet file is needed; found: {error}") from None
-    columns = {}
-    for name in names:
-        values = table[name].to_numpy()
-        number = values.dtype.kind in "iuf"
-        if _used(name) and not number:
+    columns = {name: np.empty(0) for name in names}
+    for name, values in arrays.items():
+        if values.dtype.kind not in "iuf":
             raise LogError(f"{path}: {name} must be numbers; found {table[name].type}")
-        columns[name] = values.astype(float) if number else np.empty(0)
+        columns[name] = values.astype(float)
     return columns
 
 
@@ -250,11 +280,13 @@ def _block(
     cov = np.empty((len(columns["time"]), size, size))
     for i in range(size):
         for j in range(i, size):
-            options = [n for a, b in ((i, j), (j, i)) for n in _names(matrix, a + 1, b + 1)]
-            name = next((n for n in options if n in columns), None)
-            if name is None:
-                raise LogError(f"{path}: column {options[0]} is needed; write 0 if it is zero")
-            cov[:, i, j] = cov[:, j, i] = columns[name]
+            upper, lower = (_names(matrix, a + 1, b + 1) for a, b in ((i, j), (j, i)))
+            known = [columns[name] for name in (*upper, *lower) if name in columns]
+            if not known:
+                raise LogError(f"{path}: column {upper[0]} is needed; write 0 if it is zero")
+            one, other = known[0], known[-1]  # both triangles, or one
+            cov[:, i, j] = np.where(np.isnan(one), other, one)
+            cov[:, j, i] = np.where(np.isnan(other), one, other)
     return np.stack([columns[name] for name in names], axis=1), cov
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from navfilters.estimators import model_parts
 from navfilters.estimators.filter import Filter
 from navfilters.estimators.prediction import predict_linearized
-from navfilters.estimators.state import FilterState, first_state, keep, missed
+from navfilters.estimators.state import FilterState, first_state, keep_estimate, missed
 from navfilters.estimators.update import absent
 from navfilters.numerics import validation
 from navfilters.types import Array, Gaussian
@@ -43,7 +43,7 @@ class Memoryless:
         gone, estimate = absent(z), self.function(state.estimate, z, sensor)
         if gone is not None:
             some = gone.__array_namespace__().any(gone, axis=-1)
-            estimate = keep(some, state.estimate, estimate)
+            estimate = keep_estimate(some, state.estimate, estimate)
         return FilterState(estimate, missed(state, gone))
 
     step = Filter.step
@@ -72,6 +72,11 @@ def as_filter(estimator: Any) -> Any:
         if hasattr(estimator, "init") and hasattr(estimator, "step"):
             return estimator
         if isinstance(estimator, partial) and isinstance(estimator.func, Filter):
+            if estimator.args:
+                raise TypeError(
+                    "estimator must be a partial of a filter with options by name, as "
+                    f"points=SigmaPoints(); found {estimator.args[0]!r} without one"
+                )
             return estimator.func.having(**estimator.keywords)
         if callable(estimator):
             _takes_three(estimator)

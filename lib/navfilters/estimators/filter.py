@@ -17,7 +17,15 @@ from navfilters.estimators.moments import linearized
 from navfilters.estimators.options import accepted, keywords
 from navfilters.estimators.prediction import PREDICTIONS, in_parts, predict_linearized
 from navfilters.estimators.rule import Rule
-from navfilters.estimators.state import FilterState, first_state, given_prior, keep, kept, missed
+from navfilters.estimators.state import (
+    FilterState,
+    first_state,
+    given_prior,
+    keep,
+    keep_estimate,
+    kept,
+    missed,
+)
 from navfilters.estimators.update import FORMS, Form, absent, fit, innovation
 from navfilters.estimators.variants import Variant, unchanged
 from navfilters.numerics import validation
@@ -238,8 +246,11 @@ class Filter:
             y = innovation(z, moments, sensor)
         prior, memory = self.rule.enlarge(state.memory, before, y, moments)
         if gone is not None:
-            some = gone.__array_namespace__().any(gone, axis=-1)
-            prior, memory = keep(some, (before, state.memory), (prior, memory))
+            xp = gone.__array_namespace__()
+            some = xp.any(gone, axis=-1)
+            prior = keep_estimate(some, before, prior)
+            batch = xp.broadcast_shapes(some.shape, prior.mean.shape[:-1], prior.cov.shape[:-2])
+            memory = keep(xp.broadcast_to(some, batch), state.memory, memory)
         return prior, memory, moments if prior is before else None
 
     def step(

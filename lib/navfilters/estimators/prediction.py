@@ -11,6 +11,7 @@ from navfilters.estimators.moments import (
     unscented,
 )
 from navfilters.estimators.sigma_points import SigmaPoints, behind, offsets, root_of, spread
+from navfilters.numerics.small_matrices import matmul
 from navfilters.numerics.state_derivatives import first_derivative, second_derivative
 from navfilters.types import Array, Dynamics, Gaussian
 
@@ -37,7 +38,7 @@ def predict_linearized(estimate: Gaussian, dynamics: Dynamics, Q: Array) -> Gaus
     xiong2009, Eqs. (3), (4); lecture16, Eqs. (81)-(84); pogorelsky2020, Eqs. (8)-(12).
     """
     x, F, W = transition(dynamics, estimate, Q)
-    P = F @ estimate.cov @ F.mT + W
+    P = matmul(matmul(F, estimate.cov), F.mT) + W
     return Gaussian(x, (P + P.mT) / 2)
 
 

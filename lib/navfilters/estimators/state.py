@@ -87,11 +87,20 @@ def kept(gone: Array | None, before: Gaussian, after: Gaussian) -> Gaussian:
     """The estimate as it was in the members of which nothing was measured."""
     if gone is None:
         return after
-    return keep(gone.__array_namespace__().all(gone, axis=-1), before, after)
+    return keep_estimate(gone.__array_namespace__().all(gone, axis=-1), before, after)
+
+
+def keep_estimate(some: Array, before: Gaussian, after: Gaussian) -> Gaussian:
+    """``before`` in some members, ``after`` in the others, which may have more batch axes."""
+    xp = some.__array_namespace__()
+    return Gaussian(
+        xp.where(some[..., None], before.mean, after.mean),
+        xp.where(some[..., None, None], before.cov, after.cov),
+    )
 
 
 def keep(some: Array, before: Any, after: Any) -> Any:
-    """``before`` in some members, ``after`` in the others, part by part."""
+    """The same of any arrays, part by part; ``some`` has all their batch axes."""
     if after is None:
         return None
     if isinstance(after, tuple):

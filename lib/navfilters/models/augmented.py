@@ -14,7 +14,8 @@ class Augmented:
     Parameters
     ----------
     sensor : MeasurementModel
-        Of the first states alone, with ``jacobian``; its ``residual`` is this one's.
+        Of the first states alone, with ``jacobian``; its ``residual`` is this one's. None of
+        ``noise``, ``given`` and ``at``, which would be lost.
     own : int
         How many those are.
     B : array (..., m, n)
@@ -23,7 +24,8 @@ class Augmented:
     Raises
     ------
     ValueError
-        An ``own`` that is not 1 to n, a B that does not have the rows of the sensor's R.
+        An ``own`` that is not 1 to n, a B that does not have the rows of the sensor's R, a sensor
+        with more than can be passed on, or without ``jacobian``.
     """
 
     sensor: Any
@@ -31,6 +33,13 @@ class Augmented:
     B: Array
 
     def __post_init__(self) -> None:
+        lost = [part for part in ("noise", "given", "at") if hasattr(self.sensor, part)]
+        if lost or not hasattr(self.sensor, "jacobian"):
+            found = f"{lost[0]}, which would be lost" if lost else "no jacobian"
+            raise ValueError(
+                "sensor must have R, h and jacobian, and no noise, given or at; found "
+                f"{type(self.sensor).__name__} with {found}"
+            )
         B = validation.real_array("B", self.B, "m, n")
         m, own = self.sensor.R.shape[-1], validation.whole_number("own", self.own, 1)
         if B.shape[-2] != m:

@@ -1,11 +1,12 @@
 """z = (range, bearing) of a point in the plane, seen from the origin."""
 
 from dataclasses import dataclass
+from functools import partial
 from math import pi
 
 from navfilters.numerics import validation
 from navfilters.numerics.analytic import atan2, hypot
-from navfilters.numerics.in_floats import in_floats
+from navfilters.numerics.in_floats import POINTS, in_floats
 from navfilters.numerics.small_matrices import matrix, vector
 from navfilters.types import Array
 
@@ -111,7 +112,7 @@ def _polar(x: Array) -> Array:
     return vector([hypot(x1, x2), atan2(x2, x1)])
 
 
-@in_floats
+@partial(in_floats, longest=POINTS)
 def _wrapped(z: Array, z_hat: Array) -> Array:
     y = z - z_hat
     turns = y.__array_namespace__().ceil(y[..., 1] / (2 * pi) - 0.5)

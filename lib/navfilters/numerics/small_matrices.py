@@ -12,6 +12,9 @@ from navfilters.types import Array
 WRITTEN_OUT = SMALL
 """Largest size of the matrices whose products are written out; above, BLAS is as fast."""
 
+COMPILED = 6
+"""The same under JAX, whose ``@`` on a processor is a call for each member: as fast from here."""
+
 
 def matmul(A: Array, B: Array) -> Array:
     """A B, for each pair of a stack.
@@ -28,10 +31,14 @@ def matmul(A: Array, B: Array) -> Array:
     Notes
     -----
     Up to 2 x 2 the sum of the products of A's columns and B's rows, so that a member's last bits
-    depend neither on the others nor on their number; larger ones are left to ``@``.
+    depend neither on the others nor on their number; larger ones are left to ``@``, under JAX
+    those above 6 x 6.
     """
-    if max(A.shape[-2], A.shape[-1], B.shape[-1]) <= WRITTEN_OUT:
+    size = max(A.shape[-2], A.shape[-1], B.shape[-1])
+    if size <= WRITTEN_OUT:
         return written_out(A, B)
+    if size <= COMPILED and type(A) is not np.ndarray and is_jax(A.__array_namespace__()):
+        return _by_members(A, B)
     single = type(A) is type(B) is np.ndarray and A.ndim == B.ndim == 2
     if single and A.flags.forc and B.flags.forc:
         return A.dot(B)  # the same call of BLAS in a third of the time
@@ -50,16 +57,41 @@ def written_out(A: Array, B: Array) -> Array:
     Returns
     -------
     array (..., n, m)
-
-    Notes
-    -----
-    JAX compiles it together with what stands around it. On a processor its ``@`` is a call for each
-    member: for 6 x 6 that takes five times as long.
     """
     product = A[..., :1] * B[..., :1, :]
     for i in range(1, A.shape[-1]):
         product += A[..., i : i + 1] * B[..., i : i + 1, :]  # in place where that can be
     return product
+
+
+def _by_members(A: Array, B: Array) -> Array:
+    """The same for JAX, with the members innermost in memory: an instruction is one of several."""
+    xp, batch = A.__array_namespace__(), max(A.ndim, B.ndim) - 2
+    A, B = (members_last(M[(None,) * (batch + 2 - M.ndim)]) for M in (A, B))
+
+    def rows(A: Array) -> Array:
+        return sum(A[:, i, None] * B[i] for i in range(A.shape[1]))
+
+    # Put together from halves, XLA writes it to memory. Else it would compute each element of this
+    # product anew for every element of the next one.
+    half = len(A) // 2
+    return members_first(xp.concat([rows(A[:half]), rows(A[half:])]) if half else rows(A))
+
+
+def stacked(rows: list[list[Array]]) -> Array:
+    """A matrix (n, m, ...) from the rows of its elements (...)."""
+    xp = rows[0][0].__array_namespace__()
+    return xp.stack([xp.stack(row) for row in rows])
+
+
+def members_last(M: Array) -> Array:
+    """M (..., n, k) as (n, k, ...)."""
+    return M.__array_namespace__().permute_dims(M, (M.ndim - 2, M.ndim - 1, *range(M.ndim - 2)))
+
+
+def members_first(M: Array) -> Array:
+    """M (n, k, ...) as (..., n, k)."""
+    return M.__array_namespace__().permute_dims(M, (*range(2, M.ndim), 0, 1))
 
 
 def identity(A: Array) -> Array:
@@ -215,7 +247,7 @@ def _deferred_cholesky(A: Array) -> tuple[Array, Array, Array]:
     """
     xp, n, batch = A.__array_namespace__(), A.shape[-1], A.shape[:-2]
     front, back = (len(batch), len(batch) + 1, *range(len(batch))), (*range(2, A.ndim), 0, 1)
-    lower = xp.where(xp.tril(xp.ones((n, n), dtype=bool)), A, A.mT)
+    lower = 1.0 * xp.where(xp.tril(xp.ones((n, n), dtype=bool)), A, A.mT)  # no whole numbers
     flat = xp.reshape(xp.permute_dims(lower, front), (-1,))  # the members innermost in memory
     a = xp.reshape(flat, (n, n, *batch))
     number, zero = xp.arange(n).reshape(n, *(1,) * len(batch)), xp.zeros_like(a[0])

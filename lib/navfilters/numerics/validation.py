@@ -39,6 +39,7 @@ def given(name: str, value: Any) -> Any:
     Returns
     -------
     array
+        Of real numbers; whole ones become them.
 
     Raises
     ------
@@ -50,7 +51,9 @@ def given(name: str, value: Any) -> Any:
     known = type(value) is np.ndarray or (
         hasattr(value, "__array_namespace__") and not isinstance(value, np.ndarray | np.generic)
     )
-    if known and value.dtype.kind in "fiu":
+    if known and value.dtype.kind in "iu":
+        return value.astype(float)  # a model may make its value of the state's own type
+    if known and value.dtype.kind == "f":
         return value
     return real_array(name, value, "", finite=False)
 

@@ -20,7 +20,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arguments : sequence of str, optional
         Those of the command line by default.
     """
-    parser = argparse.ArgumentParser(description="Every cure on every patient.")
+    parser = argparse.ArgumentParser(
+        prog="navfilters cures", description="Every cure on every patient."
+    )
     parser.add_argument("--runs", type=int, default=stored.RUNS, help="of each pair")
     parser.add_argument("--workers", type=int, help="processes; one per core by default")
     parser.add_argument("--quick", action="store_true", help="200 updates of the static fix")

@@ -9,6 +9,7 @@ import numpy as np
 
 from navfilters.runs import stored_arrays
 from navfilters.runs.march import Job, Kept
+from navfilters.runs.surroundings import Surroundings
 from navfilters.runs.trees import Leaf, Tree, flatten, unflatten
 from navfilters.version import __version__
 
@@ -74,11 +75,13 @@ class Checkpoint:
 
 
 def _fingerprint(job: Job, leaves: list[Leaf], size: int) -> str:
-    """A hash of all that decides what the chunks hold, but for the source of the filters."""
+    """A hash of all that decides what the chunks hold, but for the source of filters and models."""
     digest = hashlib.sha256()
     options = (job.engine, job.grid, job.steps, job.z_per_step, size)
     digest.update(repr((__version__, options)).encode())
     _add(digest, job.tree)
+    for number in Surroundings.of(job.tree).numbers():
+        digest.update(repr(number).encode())
     for leaf in leaves:
         digest.update(repr((leaf.name, leaf.array.dtype, leaf.array.shape)).encode())
         digest.update(np.ascontiguousarray(leaf.array).data)

@@ -11,6 +11,7 @@ from navfilters.estimators.filter import Filter
 from navfilters.estimators.update import COMPLETE
 from navfilters.numerics.extras import missing
 from navfilters.runs.march import Job, Kept, March
+from navfilters.runs.surroundings import Surroundings
 from navfilters.runs.trees import Tree
 
 try:
@@ -19,7 +20,7 @@ try:
 except ImportError as error:
     raise missing("jax", "navfilters[jax]", 'engine="jax"', error) from None
 
-BLOCK = 512
+BLOCK = 128
 """Members that a processor's core takes through all steps at once: their arrays stay in its cache,
 and since every block is the same program, a member's result does not depend on the chunk's size."""
 
@@ -52,8 +53,9 @@ def by_jax(job: Job, arrays: list[np.ndarray]) -> Kept:
     """
     with jax.enable_x64(True):
         with _compiling:  # two threads would both compile
-            tree = job.tree if job.tree.constant else _Once(job.tree, job.sweep)
-            key = (tree, job.axes, job.steps, job.z_per_step, job.complete)
+            around = Surroundings.of(job.tree).key
+            tree = _Once(job.tree, job.sweep) if around is None else job.tree
+            key = (tree, around, job.axes, job.steps, job.z_per_step, job.complete)
             run = _program(key, tuple((a.shape, a.dtype) for a in arrays))
         return jax.tree.map(np.asarray, run(arrays))
 
@@ -81,7 +83,7 @@ class _Once:
 @lru_cache(maxsize=64)
 def _program(key: tuple[Any, ...], shapes: tuple[Any, ...]) -> Any:
     """The executable of a job for arrays of these shapes."""
-    tree, axes, steps, z_per_step, complete = key
+    tree, _, axes, steps, z_per_step, complete = key
     if isinstance(tree, _Once):
         tree = tree.tree
     job = Job("jax", tree, axes, (), steps, z_per_step)

@@ -8,6 +8,7 @@ import numpy as np
 from navfilters.estimators.model_parts import at, noise
 from navfilters.numerics import validation
 from navfilters.numerics.probing import alike, first_member, unwritable
+from navfilters.runs.difference_checks import manifold, residual
 from navfilters.runs.system_checks import refuse_systems
 from navfilters.types import Gaussian, MeasurementModel
 
@@ -181,7 +182,7 @@ def models(model: Any, motion: Any, prior: Gaussian, steps: int, name: str = "pr
 
 
 def sensor(model: MeasurementModel, prior: Gaussian, *, name: str = "prior") -> None:
-    """Check a model's h, jacobian and hessian, those that it has, at the states of a prior.
+    """Check what a model has of h, jacobian, hessian and the differences that are its own.
 
     Parameters
     ----------
@@ -198,6 +199,7 @@ def sensor(model: MeasurementModel, prior: Gaussian, *, name: str = "prior") -> 
     """
     m, n, mean = measured_size(model, prior), prior.cov.shape[-1], prior.mean
     own = np.shape(model.R)[:-2]
+    manifold("model", model, prior, own)
     for part, core in (("h", (m,)), ("jacobian", (m, n)), ("hessian", (m, n, n))):
         function = getattr(model, part, None)
         if function is None:
@@ -210,10 +212,11 @@ def sensor(model: MeasurementModel, prior: Gaussian, *, name: str = "prior") -> 
             raise ValueError(
                 f"{error}; {name}.mean must be a state of the model: found shape {mean.shape}"
             ) from error
+    residual(model, prior, m)
 
 
 def dynamics(model: Any, prior: Gaussian) -> None:
-    """Check a model's f, transition and propagate, those that it has, and its Q.
+    """Check a model's f, transition, propagate and differences, those it has, and its Q.
 
     Parameters
     ----------
@@ -236,6 +239,7 @@ def dynamics(model: Any, prior: Gaussian) -> None:
     size = None if "propagate" in known else n
     Q = validation.covariance("dynamics.Q", model.Q, size, definite=False)
     own = Q.shape[:-2]
+    manifold("dynamics", model, prior, own)
 
     def parts(name: str, count: int) -> list[Callable[[Any], Any]]:
         seen: dict[Any, tuple[Any, ...]] = {}  # the parts are asked for at the same states

@@ -11,6 +11,7 @@ from navfilters.numerics import validation
 from navfilters.runs import model_checks
 from navfilters.runs.chunks import compute
 from navfilters.runs.march import Chunk, Job, Kept, March
+from navfilters.runs.surroundings import Surroundings
 from navfilters.runs.system_checks import compare_derivatives
 from navfilters.runs.trees import Leaf, Tree, flatten
 from navfilters.types import Gaussian
@@ -182,12 +183,13 @@ def first_step(job: Job, problem: Problem) -> Kept:
     jax = sys.modules.get("jax")
     doubles = jax is None or jax.config.jax_enable_x64  # where a model may be one of JAX
     steps = min(job.steps, 1)
-    known = (job.engine, doubles, job.tree, kinds, steps, job.z_per_step, job.complete)
-    if job.tree.constant and known in FIRST:
+    around = Surroundings.of(job.tree).key
+    known = (job.engine, doubles, job.tree, around, kinds, steps, job.z_per_step, job.complete)
+    if around is not None and known in FIRST:
         return FIRST[known]
     _probe_models(job, problem)
     kept = compute(replace(job, engine="numpy", steps=steps), problem.chunk(0, 1))
-    if job.tree.constant:
+    if around is not None:
         FIRST[known] = kept
     return kept
 

@@ -105,8 +105,9 @@ def sweep(
     chunk : int, optional
         Configurations computed together; by default what fits the cache. JAX rounds it up.
     checkpoint : path, optional
-        A folder for finished chunks: the same call again computes only those that are missing. The
-        source of the filters is not compared: use another folder when it changes.
+        A folder for finished chunks: the same call again computes only those that are missing. Of
+        the source of filters and models only the numbers are compared that it reads by global names
+        or has as attributes of classes: use another folder when the rest changes.
     progress : bool or callable
         A bar with rate and time left, where standard error is a terminal and tqdm is installed; or
         who is told of every chunk how many configurations it has finished.
@@ -142,7 +143,7 @@ def sweep(
     Notes
     -----
     A configuration's result depends neither on the others, nor on their order, nor on the workers;
-    nor on the chunk, unless it is smaller than 512 under JAX, or than 2 under NumPy where products
+    nor on the chunk, unless it is smaller than 128 under JAX, or than 2 under NumPy where products
     are left to BLAS (in a model, or with more than two states or measurements): then the last bits
     of each step may differ.
 

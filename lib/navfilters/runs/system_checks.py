@@ -14,8 +14,13 @@ from navfilters.types import Gaussian
 
 
 def refuse_systems(model: Any, dynamics: Any) -> None:
-    """TypeError, saying what to give, for a system where a run takes a model."""
+    """TypeError, saying what to give, for a system, or a class, where a run takes a model."""
     for name, found in (("model", model), ("dynamics", dynamics)):
+        if isinstance(found, type):
+            raise TypeError(
+                f"{name} must be an object, made by calling its class, as {found.__name__}(); "
+                f"found the class {found.__name__} itself"
+            )
         if isinstance(found, DiscreteSystem):
             raise TypeError(
                 f"{name} must be one of the system's two models: model=system.sensor and "

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property, partial
 from numbers import Real
-from types import BuiltinFunctionType, FunctionType, SimpleNamespace
+from types import FunctionType, SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,15 +35,6 @@ class Fixed:
 
     def __hash__(self) -> int:
         return hash(self.value) if _hashable(self.value) else id(self.value)
-
-    @property
-    def constant(self) -> bool:
-        """Whether it is certain that the same value will do the same later on."""
-        value = self.value
-        if isinstance(value, FunctionType):
-            return value.__closure__ is None and not value.__dict__
-        simple = bool | Real | complex | str | bytes | np.generic | type | BuiltinFunctionType
-        return value is None or isinstance(value, simple)
 
 
 def _hashable(value: Any) -> bool:
@@ -85,11 +76,6 @@ class Tree:
         if self.fixed is not None:
             return self.fixed.value is None
         return all(part.only_arrays for part in self.parts)
-
-    @cached_property
-    def constant(self) -> bool:
-        """Whether all that is fixed in it is :attr:`Fixed.constant`."""
-        return (self.fixed is None or self.fixed.constant) and all(p.constant for p in self.parts)
 
 
 class Leaf(NamedTuple):
@@ -142,7 +128,9 @@ class Leaf(NamedTuple):
         if self.axis is None:
             return self.array
         shape, last = self.array.shape, self.lead + len(self.batch)
-        every = np.broadcast_to(self.array, (*shape[: self.lead], *batch, *shape[last:]))
+        missing = (1,) * (len(batch) - len(self.batch))  # behind the series, not in front of it
+        whole = self.array.reshape(*shape[: self.lead], *missing, *shape[self.lead :])
+        every = np.broadcast_to(whole, (*shape[: self.lead], *batch, *shape[last:]))
         lead: tuple[Any, ...] = (slice(None),) * self.lead
         return np.ascontiguousarray(every[lead + index])
 

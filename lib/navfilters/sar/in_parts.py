@@ -3,10 +3,14 @@
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from threading import Lock, Semaphore
 from typing import TypeVar
 
 Part = TypeVar("Part")
 Result = TypeVar("Result")
+
+_SECOND_CORE = Semaphore()
+"""Held while two threads are at work."""
 
 
 def blocks(n: int, most: int) -> list[slice]:
@@ -26,7 +30,9 @@ def blocks(n: int, most: int) -> list[slice]:
 def in_threads(work: Callable[[Part], Result], parts: Iterable[Part]) -> list[Result]:
     """Do all parts of some work, of which none writes what another does.
 
-    Where ``OPENBLAS_NUM_THREADS`` is 1, there is a process for each core, and no second thread.
+    Two threads at most are at work, however deep parts are made of parts: what one of them calls
+    has a second thread as soon as the other has nothing left. Where ``OPENBLAS_NUM_THREADS`` is 1,
+    there is a process for each core, and no second thread.
 
     Parameters
     ----------
@@ -39,7 +45,25 @@ def in_threads(work: Callable[[Part], Result], parts: Iterable[Part]) -> list[Re
     list
         What the work returns of each.
     """
-    if os.environ.get("OPENBLAS_NUM_THREADS") == "1":
-        return [work(part) for part in parts]
-    with ThreadPoolExecutor(2) as pool:
-        return list(pool.map(work, parts))  # here an error in a thread is raised
+    numbered, done = list(enumerate(parts)), dict[int, Result]()
+    alone = os.environ.get("OPENBLAS_NUM_THREADS") == "1"
+    if alone or not _SECOND_CORE.acquire(blocking=False):
+        return [work(part) for _, part in numbered]
+    todo, first_to_end = iter(numbered), Lock()
+
+    def share() -> None:
+        try:
+            for k, part in todo:  # each thread takes the next
+                done[k] = work(part)
+        except BaseException:
+            list(todo)  # nothing is left to do
+            raise
+        finally:
+            if first_to_end.acquire(blocking=False):
+                _SECOND_CORE.release()
+
+    with ThreadPoolExecutor(1) as pool:
+        other = pool.submit(share)
+        share()
+        other.result()  # here an error in that thread is raised
+    return [done[k] for k, _ in numbered]

@@ -6,9 +6,10 @@ from functools import partial
 
 from navfilters.numerics import validation
 from navfilters.numerics.loops import is_jax, repeat
-from navfilters.space.earth_fixed_orbit import TURN, EarthFixedOrbit, padded
+from navfilters.numerics.small_matrices import stacked
+from navfilters.space.earth_fixed_orbit import EarthFixedOrbit, padded
 from navfilters.space.pose import difference, retract
-from navfilters.space.variations import forwards, rates, series, to_end
+from navfilters.space.variations import Pair, forwards, rates, series, to_end
 from navfilters.types import Array
 
 
@@ -126,17 +127,22 @@ class EarthFixedNavigation:
 
     def _step(self, k: Array, x: Array) -> tuple[Array, Callable[..., Array]]:
         """Position and velocity a step later, and M -> F M, for JAX."""
-        orbit, xp = self.orbit, x.__array_namespace__()
-        x_next, turn = orbit.advance(x), orbit.rate * xp.asarray(TURN)
-        printed = orbit.integrator == "printed"
+        orbit, w, printed = self.orbit, self.orbit.rate, self.orbit.integrator == "printed"
+        x_next = orbit.advance(x)
         at = x if printed else (x + x_next) / 2
-        A = partial(rates, orbit.gravity.gradient(at[..., :3]) - turn @ turn, -2 * turn)
+        G = orbit.gravity.gradient_elements(at[..., 0], at[..., 1], at[..., 2])
+        G[0][0], G[1][1] = G[0][0] + w * w, G[1][1] + w * w
+
+        def coriolis(v: Array) -> Array:
+            xp = v.__array_namespace__()
+            return xp.stack([2 * w * v[1], -2 * w * v[0], xp.zeros_like(v[2])])
+
+        A = partial(rates, stacked(G), coriolis)
         if not printed:
             return x_next, partial(series, A, orbit.step, 2)
 
-        def grow(M: Array) -> Array:
-            step = orbit.step * A(M)
-            bend = orbit.step / 2 * A(step)  # of Eq. (11) alone
-            return M + step + xp.concat([bend[..., :3, :], 0 * bend[..., 3:, :]], axis=-2)
+        def grow(r: Array, v: Array) -> Pair:
+            h, (_, a) = orbit.step, A(r, v)
+            return r + h * v + (h * h / 2) * a, v + h * a  # Eq. (11)
 
         return x_next, grow

@@ -12,6 +12,7 @@ from navfilters.numerics import validation
 from navfilters.numerics.analytic import dot
 from navfilters.numerics.loops import is_jax, repeat
 from navfilters.numerics.runge_kutta import euler_increment, runge_kutta_increment
+from navfilters.numerics.small_matrices import members_last, stacked
 from navfilters.numerics.whole_paths import whole_path
 from navfilters.space import sub_steps, variations
 from navfilters.space.gravity import EARTH, Gravity
@@ -290,8 +291,12 @@ class Orbit:
             x_next, at, order = self._advance(pushes, k, x), x, 1
             if self.integrator == "rk4":
                 at, order = variations.middle(x, x_next, self.step), 3
-            V = None if pushes is None else along_velocity(at[..., 3:], pushes[k])
-            A = partial(variations.rates, self.gravity.gradient(at[..., :3]), V)
+            of_v = None
+            if pushes is not None:
+                V = members_last(along_velocity(at[..., 3:], pushes[k]))
+                of_v = partial(variations.product, V)
+            G = self.gravity.gradient_elements(at[..., 0], at[..., 1], at[..., 2])
+            A = partial(variations.rates, stacked(G), of_v)
             return x_next, partial(variations.series, A, self.step, order)
 
         return variations.forwards(sub_step, x, self.substeps, 6, Q)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from navfilters.numerics.loops import repeat
-from navfilters.numerics.small_matrices import written_out
+from navfilters.numerics.small_matrices import members_first, members_last
 from navfilters.types import Array
 
 CACHED = 4000
@@ -16,49 +16,54 @@ CACHED = 4000
 FEW = 12
 """Terms that stand for all of a long series: over a third of a radian of an orbit, to 1e-14."""
 
+Pair = tuple[Array, Array]
+"""Differences of position and velocity, or their rates: arrays (3, k, ...), members last."""
 
-def rates(G: Array, V: Array | None, M: Array) -> Array:
-    """A M, the rate of change of M, of which only position and velocity change.
+
+def rates(G: Array, of_v: Callable[[Array], Array] | None, r: Array, v: Array) -> Pair:
+    """How fast differences of position and velocity grow: v, and G r + V v.
 
     Parameters
     ----------
-    G, V : array (..., 3, 3)
-        Derivatives of the acceleration with respect to position, s^-2, and velocity, s^-1; a V of
-        None is zero.
-    M : array (..., n, k)
-        n of at least 6.
+    G : array (3, 3, ...)
+        Derivative of the acceleration with respect to position, s^-2.
+    of_v : callable, optional
+        v -> V v, with V the derivative with respect to velocity, s^-1; by default zero.
+    r, v : array (3, k, ...)
 
     Returns
     -------
-    array (..., n, k)
+    tuple of array (3, k, ...)
     """
-    of_v = M[..., 3:6, :]
-    of_a = written_out(G, M[..., :3, :])
-    if V is not None:
-        of_a = of_a + written_out(V, of_v)
-    xp = M.__array_namespace__()
-    return xp.concat([of_v, of_a, xp.zeros_like(M[..., 6:, :])], axis=-2)
+    of_r = product(G, r)
+    return v, of_r if of_v is None else of_r + of_v(v)
 
 
-def series(A: Callable[[Array], Array], h: float, order: int, M: Array) -> Array:
-    """exp(h A) M to an order in h.
+def product(A: Array, B: Array) -> Array:
+    """A (3, 3, ...) times B (3, k, ...)."""
+    return A[:, 0, None] * B[0] + A[:, 1, None] * B[1] + A[:, 2, None] * B[2]
+
+
+def series(A: Callable[[Array, Array], Pair], h: float, order: int, r: Array, v: Array) -> Pair:
+    """exp(h A) (r, v) to an order in h.
 
     Parameters
     ----------
     A : callable
-        M -> A M.
+        (r, v) -> their rates.
     h : float
         Length of the step, s.
     order : int
-    M : array (..., n, k)
+    r, v : array (3, k, ...)
 
     Returns
     -------
-    array (..., n, k)
+    tuple of array (3, k, ...)
     """
-    grown = M
+    grown = r, v
     for i in range(order, 0, -1):  # Horner's scheme: M + h A (M + h/2 A (M + h/3 A M))
-        grown = M + (h / i) * A(grown)
+        of_r, of_v = A(*grown)
+        grown = r + (h / i) * of_r, v + (h / i) * of_v
     return grown
 
 
@@ -69,7 +74,7 @@ def third_order(hA: Array) -> Array:
 
 
 def forwards(
-    step: Callable[[Array, Array], tuple[Array, Callable[[Array], Array]]],
+    step: Callable[[Array, Array], tuple[Array, Callable[[Array, Array], Pair]]],
     x: Array,
     count: int,
     n: int,
@@ -82,34 +87,54 @@ def forwards(
     Parameters
     ----------
     step : callable
-        (k, x) -> the next x, and a function M -> F_k M.
-    x : array (..., m)
+        (k, x) -> the next x, and a function that makes F_k M of M's rows of position and velocity.
+    x : array (..., 6)
         State at the start.
     count : int
     n : int
-        Size of the derivative, that of the error.
+        Size of the derivative, that of the error: what it has beyond position and velocity stays.
     Q : array (..., n, n), optional
         Covariance of the noise after each step.
 
     Returns
     -------
-    tuple of array (..., m), array (..., n, n) and, given Q, array (..., n, n)
+    tuple of array (..., 6), array (..., n, n) and, given Q, array (..., n, n)
         x, F and W.
 
     Notes
     -----
     One loop, which JAX compiles once for all steps. NumPy is faster with :func:`to_end`.
     """
-    xp = x.__array_namespace__()
-    F = xp.zeros_like(x[..., :1])[..., None] + xp.eye(n)
-    W = () if Q is None else (xp.zeros_like(F + Q),)
+    xp, shape = x.__array_namespace__(), x.shape
+    if Q is not None:  # which may have axes that no state has
+        x = x[(None,) * (Q.ndim - 1 - x.ndim)]
+    zero = 0 * x[..., 0]
+    eye = xp.eye(n).reshape(n, n, *(1,) * zero.ndim) + zero
+    start = [x, eye[:3, :6], eye[3:6, :6]]
+    if Q is not None:
+        added = members_last(Q + zero[..., None, None])
+        start += [0 * added[:3], 0 * added[3:6]]
 
     def advance(k: Array, carry: tuple[Array, ...]) -> tuple[Array, ...]:
-        x, F, *W = carry
+        x, r, v, *W = carry
         x, grow = step(k, x)
-        return x, grow(F), *(grow(grow(w).mT) + Q for w in W)
+        return x, *grow(r, v), *(noisy(grow, *W) if W else ())
 
-    return repeat(advance, (x, F, *W), count, xp)
+    def noisy(grow: Callable[[Array, Array], Pair], r: Array, v: Array) -> Pair:
+        r, v = grow(r, v)
+        turned = xp.concat([r, v])[:, :6].swapaxes(0, 1)
+        parts = zip(grow(turned[:3], turned[3:]), (r, v), (added[:3], added[3:6]), strict=True)
+        one, other = (xp.concat([M, rest[:, 6:]], axis=1) + q for M, rest, q in parts)
+        return one, other
+
+    x, r, v, *W = repeat(advance, tuple(start), count, xp)
+    F = xp.concat([xp.concat([r, v]), eye[:6, 6:]], axis=1)
+    found = x.reshape(shape), members_first(xp.concat([F, eye[6:]])).reshape(*shape[:-1], n, n)
+    if Q is None:
+        return found
+    beside = xp.concat(W)
+    below = xp.concat([beside[:, 6:].swapaxes(0, 1), count * added[6:, 6:]], axis=1)
+    return *found, members_first(xp.concat([beside, below]))
 
 
 def to_end(transitions: Callable[[int, Array], Array], path: Array, n: int) -> Iterator[Array]:

@@ -43,7 +43,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arguments : sequence of str, optional
         Those of the command line by default.
     """
-    parser = argparse.ArgumentParser(description="Every filter on the satellite that leaked.")
+    parser = argparse.ArgumentParser(
+        prog="navfilters w3b", description="Every filter on the satellite that leaked."
+    )
     parser.add_argument("--draws", type=int, default=8, help="starts of each size")
     parser.add_argument("--steps", type=int, help="so many of the 860 numbers; by default all")
     parser.add_argument("--filters", nargs="*", choices=CURES, default=list(CURES))

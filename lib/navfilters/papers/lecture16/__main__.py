@@ -28,7 +28,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arguments : sequence of str, optional
         Those of the command line by default.
     """
-    parser = argparse.ArgumentParser(description="Three filters on a shaken pendulum.")
+    parser = argparse.ArgumentParser(
+        prog="navfilters lecture16", description="Three filters on a shaken pendulum."
+    )
     parser.add_argument("--runs", type=int, default=8, help="with noise of their own")
     parser.add_argument(
         "--released", type=float, default=Setup.released, help="true angle at the start, rad"

@@ -33,7 +33,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arguments : sequence of str, optional
         Those of the command line by default.
     """
-    parser = argparse.ArgumentParser(description="Ten filters: divergence maps, or noise.")
+    parser = argparse.ArgumentParser(
+        prog="navfilters perea2007", description="Ten filters: divergence maps, or noise."
+    )
     parser.add_argument("--size", type=int, default=256, help="points in each direction")
     parser.add_argument("--engine", choices=("numpy", "jax"), default="numpy")
     parser.add_argument("--steps", type=int, default=Setup.steps, help="number of updates")

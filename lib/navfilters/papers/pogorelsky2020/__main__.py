@@ -18,7 +18,7 @@ from navfilters.runs.progress import progress as progress_bar
 
 
 def _parser(description: str) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=description)
+    parser = argparse.ArgumentParser(prog="navfilters pogorelsky2020", description=description)
     parser.add_argument("--case", choices=sorted(CASES), default="TC-1", help="test case")
     parser.add_argument("--runs", type=int, help="number of runs; 100 by default")
     parser.add_argument("--seed", type=int, default=0, help="seed of all runs")

@@ -88,7 +88,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arguments : sequence of str, optional
         Those of the command line by default.
     """
-    parser = argparse.ArgumentParser(description="Table 1 of Xiong, Zhang and Liu (2009).")
+    parser = argparse.ArgumentParser(
+        prog="navfilters xiong2009", description="Table 1 of Xiong, Zhang and Liu (2009)."
+    )
     parser.add_argument("--variant", choices=sorted(VARIANTS), default="A", help="noise reading")
     parser.add_argument("--seeds", type=int, default=20, help="number of runs")
     parser.add_argument("--rivals", action="store_true", help="other filters beside the paper's")

@@ -126,7 +126,8 @@ def errors_each_second(
     starts, every = mean[first:-1], round(1 / setup.step)
     times = setup.interval * np.arange(first, len(mean) - 1.0)
     orbit, batch = _orbit(setup, knows_thrust), mean.shape[1:-1]
-    estimate = np.empty((1 + len(starts) * setup.interval, *batch, 3))
+    # Components first in memory, as in a path.
+    estimate = np.moveaxis(np.empty((3, 1 + len(starts) * setup.interval, *batch)), 0, -1)
     estimate[:1] = starts[:1, ..., :3]
     intervals = estimate[1:].reshape(len(starts), setup.interval, *batch, 3)
     size = max(1, AT_A_TIME // max(1, mean[0, ..., 0].size))

@@ -87,19 +87,13 @@ class Focuser:
         for name, value, most in (("lines", lines, pulses), ("samples", samples, whole)):
             if value is not None and validation.whole_number(name, value, 2) > most:
                 raise ValueError(f"{name} must be at most {most} for these data; found {value}")
-        if bandwidth is not None and not 0 < bandwidth <= raw.prf:
-            raise ValueError(f"bandwidth must be in (0, {raw.prf}] Hz; found {bandwidth}")
         self._wavelength, self._sampling, self._prf = raw.wavelength, raw.sampling, raw.prf
         self._near_range, self._first_time = raw.near_range, raw.first_time
         self._lines, self._samples = lines or pulses, samples or whole
         self._first = (pulses - self._lines) // 2
         self._n, m = fft.next_fast_len(pulses), fast_length(ranges)
-        f = fft.fftfreq(self._n, 1 / raw.prf)
-        f = doppler_centroid + (f - doppler_centroid + raw.prf / 2) % raw.prf - raw.prf / 2
-        half = (bandwidth or 1.01 * raw.prf) / 2
-        kept = np.flatnonzero(np.abs(f - doppler_centroid) <= half)
-        self._kept = kept[np.argsort(f[kept])]  # neighbours in frequency, as the blocks need them
-        self._f, self._f_R = f[self._kept], fft.fftfreq(m, 1 / raw.sampling)
+        self._kept, self._f = self._band(bandwidth, doppler_centroid)
+        self._f_R = fft.fftfreq(m, 1 / raw.sampling)
         self._migration = migration
         self._removed = np.inf  # the velocity for which migration is gone: at none, there is none
         matched = _matched(raw, m)
@@ -137,6 +131,47 @@ class Focuser:
     def centre_range(self) -> float:
         """Slant range of an image's centre pixel, where its velocity holds, m. Eq. (1)."""
         return self._near_range + self._samples // 2 * self.range_spacing
+
+    def otherwise(
+        self,
+        *,
+        bandwidth: float | None = None,
+        doppler_centroid: float = 0.0,
+        migration: bool = True,
+    ) -> "Focuser":
+        """The same data, processed in another way, without their transforms once more.
+
+        Parameters
+        ----------
+        bandwidth, doppler_centroid, migration
+            As of the class.
+
+        Returns
+        -------
+        Focuser
+            To the last bit one of the raw data, with these options.
+
+        Raises
+        ------
+        ValueError
+            A band of which this one has not all, or a patch.
+        """
+        if np.isfinite(self._removed):
+            raise ValueError("a patch must be taken of what is processed otherwise, not before it")
+        other = copy(self)
+        other._migration = migration
+        other._kept, other._f = self._band(bandwidth, doppler_centroid)
+        row = np.full(self._n, -1)
+        row[self._kept] = np.arange(len(self._kept))
+        rows = row[other._kept]
+        if rows.min() < 0:
+            raise ValueError(
+                f"bandwidth must stay within the band of this focuser; found {bandwidth} Hz about "
+                f"{doppler_centroid}"
+            )
+        if not np.array_equal(other._kept, self._kept):
+            other._spectrum = self._spectrum[rows]
+        return other
 
     def image(self, velocity: float, slope: float = 0.0) -> Image:
         """Focus for an effective velocity.
@@ -252,6 +287,17 @@ class Focuser:
         most = lines_at_once(self._f, (migration, self._f_R))
         in_threads(cut, blocks(len(self._f), most))
         return part
+
+    def _band(self, bandwidth: float | None, centroid: float) -> tuple[Array, Array]:
+        """Which frequencies of the transform are processed, in order, and what they are, Hz."""
+        if bandwidth is not None and not 0 < bandwidth <= self._prf:
+            raise ValueError(f"bandwidth must be in (0, {self._prf}] Hz; found {bandwidth}")
+        f = fft.fftfreq(self._n, 1 / self._prf)
+        f = centroid + (f - centroid + self._prf / 2) % self._prf - self._prf / 2
+        half = (bandwidth or 1.01 * self._prf) / 2
+        kept = np.flatnonzero(np.abs(f - centroid) <= half)
+        kept = kept[np.argsort(f[kept])]  # neighbours in frequency, as the blocks need them
+        return kept, f[kept]
 
     def _migrated(self, velocity: float) -> Phase:
         """A(f_t, f_R): removes the migration and secondary range compression that are left."""

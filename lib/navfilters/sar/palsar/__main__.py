@@ -17,7 +17,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arguments : sequence of str, optional
         Those of the command line by default.
     """
-    parser = argparse.ArgumentParser(description="What an ALOS PALSAR level-1.0 file holds.")
+    parser = argparse.ArgumentParser(
+        prog="navfilters palsar", description="What an ALOS PALSAR level-1.0 file holds."
+    )
     parser.add_argument("file", help="image or leader file")
     try:
         text = contents(Path(parser.parse_args(arguments).file))

@@ -14,6 +14,9 @@ CACHED = 2**15
 """Samples of pulses that are computed at once: temporary arrays of all would come from the system
 page by page, which costs as much as they do."""
 
+FEW = 32
+"""Samples of a pulse whose phases differ from that of the first in the same way."""
+
 
 class Echoes(NamedTuple):
     """Point scatterers in the radar's coordinates.
@@ -58,15 +61,22 @@ def point_echo(
     t = window.first_time + np.arange(window.pulses) / radar.prf
     distance, pattern = _history(radar, flight, p, t)
     delay = np.arange(oversampling * window.ranges) / (oversampling * radar.sampling)
-    carrier = pattern * np.exp(-4j * np.pi * distance / radar.wavelength)
+    early = 2 * (window.near_range - distance) / LIGHT
+    # The phase is quadratic in delay + early: a square of each, and their product, in which the
+    # delay is that of the first of a few samples, and one more: few sines and cosines for all.
+    middle, rate = delay - radar.pulse_length / 2, 2 * np.pi * radar.chirp_rate
+    of_delay, of_early = _turned(rate / 2 * middle**2), _turned(rate / 2 * early**2)
+    carrier = pattern * np.exp(-4j * np.pi * distance / radar.wavelength) * of_early
     echo = np.empty((window.pulses, len(delay)), np.complex128)
 
     def heard(pulses: slice) -> None:
-        into = delay + 2 * (window.near_range - distance[pulses, None]) / LIGHT
-        phase = np.pi * radar.chirp_rate * (into - radar.pulse_length / 2) ** 2
-        chirp = _turned(phase)
+        turn = rate * early[pulses, None]
+        first = _turned(turn * middle[::FEW]) * carrier[pulses, None]
+        chirp = first[..., None] * _turned(turn * delay[:FEW])[:, None]
+        chirp = chirp.reshape(len(turn), -1)[:, : len(delay)]
+        into = delay + early[pulses, None]
         chirp[(into < 0) | (into >= radar.pulse_length)] = 0
-        np.multiply(chirp, carrier[pulses, None], out=echo[pulses])
+        np.multiply(chirp, of_delay, out=echo[pulses])
 
     in_threads(heard, blocks(window.pulses, max(CACHED // len(delay), 1)))
     return echo
