@@ -68,14 +68,19 @@ def _by_members(A: Array, B: Array) -> Array:
     """The same for JAX, with the members innermost in memory: an instruction is one of several."""
     xp, batch = A.__array_namespace__(), max(A.ndim, B.ndim) - 2
     A, B = (members_last(M[(None,) * (batch + 2 - M.ndim)]) for M in (A, B))
-
-    def rows(A: Array) -> Array:
-        return sum(A[:, i, None] * B[i] for i in range(A.shape[1]))
-
     # Put together from halves, XLA writes it to memory. Else it would compute each element of this
     # product anew for every element of the next one.
     half = len(A) // 2
-    return members_first(xp.concat([rows(A[:half]), rows(A[half:])]) if half else rows(A))
+    parts = (A[:half], A[half:]) if half else (A,)
+    return members_first(xp.concat([product_of_last(part, B) for part in parts]))
+
+
+def product_of_last(A: Array, B: Array) -> Array:
+    """A B of matrices with their members last, (n, k, ...) and (k, m, ...)."""
+    product = A[:, 0, None] * B[0]
+    for i in range(1, A.shape[1]):
+        product = product + A[:, i, None] * B[i]
+    return product
 
 
 def stacked(rows: list[list[Array]]) -> Array:

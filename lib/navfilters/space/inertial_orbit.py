@@ -12,7 +12,7 @@ from navfilters.numerics import validation
 from navfilters.numerics.analytic import dot
 from navfilters.numerics.loops import is_jax, repeat
 from navfilters.numerics.runge_kutta import euler_increment, runge_kutta_increment
-from navfilters.numerics.small_matrices import members_last, stacked
+from navfilters.numerics.small_matrices import members_last, product_of_last, stacked
 from navfilters.numerics.whole_paths import whole_path
 from navfilters.space import sub_steps, variations
 from navfilters.space.gravity import EARTH, Gravity
@@ -294,7 +294,7 @@ class Orbit:
             of_v = None
             if pushes is not None:
                 V = members_last(along_velocity(at[..., 3:], pushes[k]))
-                of_v = partial(variations.product, V)
+                of_v = partial(product_of_last, V)
             G = self.gravity.gradient_elements(at[..., 0], at[..., 1], at[..., 2])
             A = partial(variations.rates, stacked(G), of_v)
             return x_next, partial(variations.series, A, self.step, order)

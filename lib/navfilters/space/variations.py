@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from navfilters.numerics.loops import repeat
-from navfilters.numerics.small_matrices import members_first, members_last
+from navfilters.numerics.small_matrices import members_first, members_last, product_of_last
 from navfilters.types import Array
 
 CACHED = 4000
@@ -30,18 +30,15 @@ def rates(G: Array, of_v: Callable[[Array], Array] | None, r: Array, v: Array) -
     of_v : callable, optional
         v -> V v, with V the derivative with respect to velocity, s^-1; by default zero.
     r, v : array (3, k, ...)
+        Differences of position, m, and of velocity, m/s.
 
     Returns
     -------
     tuple of array (3, k, ...)
+        m/s and m/s^2.
     """
-    of_r = product(G, r)
+    of_r = product_of_last(G, r)
     return v, of_r if of_v is None else of_r + of_v(v)
-
-
-def product(A: Array, B: Array) -> Array:
-    """A (3, 3, ...) times B (3, k, ...)."""
-    return A[:, 0, None] * B[0] + A[:, 1, None] * B[1] + A[:, 2, None] * B[2]
 
 
 def series(A: Callable[[Array, Array], Pair], h: float, order: int, r: Array, v: Array) -> Pair:
